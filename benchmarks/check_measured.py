@@ -29,8 +29,7 @@ from spikecam_env.calibration.real import (
 from spikecam_env.calibration.two_levels import response_and_dark, two_levels
 from spikecam_env.calibration.wall_noise import excess_covariance
 from spikecam_env.sensor import SensorModel, SpikeSensor
-
-Array = NDArray[np.float64]
+from spikecam_env.types import Floats
 
 MODELS = ("measured", "scsim", "physical", "ideal")
 MAP_MODELS = ("measured", "scsim", "physical")
@@ -48,10 +47,10 @@ class SimulatedWall:
     """
 
     model: str
-    excess: Array
-    excess_sd: Array
+    excess: Floats
+    excess_sd: Floats
     chi2: float
-    minimum_range: Array
+    minimum_range: Floats
     variance_excess: float
     locking: Locking
 
@@ -83,7 +82,7 @@ def simulated_wall(model: SensorModel | str, wall: WallStatistics, shape: tuple[
 
 
 def record_wall(
-    model: SensorModel | str, rate: Array, shape: tuple[int, int], take: int, frames: int
+    model: SensorModel | str, rate: Floats, shape: tuple[int, int], take: int, frames: int
 ) -> NDArray[np.uint8]:
     """(frames, rows, columns) spikes of a unit whose pixels fire at `rate` (P,) [spikes/frame]."""
     sensor = SpikeSensor(model, shape, seed=0, engine="auto", take=take)
@@ -91,7 +90,7 @@ def record_wall(
     return sensor.step(light.reshape(shape).astype(np.float32), frames)
 
 
-def flat_quantiles(model: SensorModel | str, light: Array, dark: Array, seed: int = 0) -> list[dict[str, object]]:
+def flat_quantiles(model: SensorModel | str, light: Floats, dark: Floats, seed: int = 0) -> list[dict[str, object]]:
     """Rows of measured and modelled quantiles of dark level and response, and their ratio less one.
 
     light, dark: (H, W) rates of the real maps.  The model's light is scaled to the same median response.  Dark levels
@@ -106,7 +105,7 @@ def flat_quantiles(model: SensorModel | str, light: Array, dark: Array, seed: in
     return rows
 
 
-def modelled_maps(model: SensorModel | str, light: Array, seed: int = 0) -> tuple[str, Array, Array]:
+def modelled_maps(model: SensorModel | str, light: Floats, seed: int = 0) -> tuple[str, Floats, Floats]:
     """The model's name, and maps of a unit of it as the real ones: response at 335 lux, dark counts over FRAMES."""
     camera = model if isinstance(model, SensorModel) else SensorModel.load(model)
     shape = (light.shape[0], light.shape[1])

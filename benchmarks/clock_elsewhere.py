@@ -22,9 +22,8 @@ from spikecam_env.calibration.spike_times import spike_times
 from spikecam_env.calibration.two_levels import split_shading, two_levels
 from spikecam_env.errors import InputError
 from spikecam_env.streams import pack_frames
+from spikecam_env.types import Floats
 from spikecam_env.untrusted import read_arrays
-
-Array = NDArray[np.float64]
 
 EDGE = (-9.3e-3, 0.798, 0.240, 0.0)
 """amplitude [thresholds], moment at row 155, tau, fall [frames]: the wall's, by docs/clock_feedthrough.md."""
@@ -38,11 +37,11 @@ BAND = 50
 """Rows of a line of the low-light table."""
 
 
-def wall_table(edge: tuple[float, float, float, float] = EDGE) -> Array:
+def wall_table(edge: tuple[float, float, float, float] = EDGE) -> Floats:
     return falling_edge(np.arange(POINTS) / POINTS, *edge)
 
 
-def wall_start(rows: int) -> Array:
+def wall_start(rows: int) -> Floats:
     """(rows,) phases at which rows begin, on the clock of EDGE: v = t + s (row - 155) / 250 at a row's own time t."""
     return np.asarray(np.mod(SPAN * (np.arange(rows) - ROW) / 250.0, 1.0))
 
@@ -50,20 +49,20 @@ def wall_start(rows: int) -> Array:
 LAWS = {"without c(v)": None, "with c(v)": wall_table()}
 
 
-def simulated_maps(maps: FlatMaps, table: Array, seed: int = 0) -> FlatMaps:
+def simulated_maps(maps: FlatMaps, table: Floats, seed: int = 0) -> FlatMaps:
     """Counts of the same pixels at both levels and in the dark, their rates free of c drawn within a count."""
     shape, rng = maps.lit.shape, np.random.default_rng(seed)
     start = np.repeat(wall_start(shape[0]), shape[1])
     dim = np.where(maps.counted, maps.dim, np.median(maps.dim[maps.counted]))
 
-    def again(level: Array) -> Array:
+    def again(level: Floats) -> Floats:
         rate = np.maximum(level + (rng.random(shape) - 0.5) / FRAMES, 0.1 / FRAMES).ravel()
         return counts(1.0 / rate, start, table, WHITE, FRAMES, rng).reshape(shape) / FRAMES
 
     return FlatMaps(again(maps.lit), again(dim), again(maps.dark), maps.counted)
 
 
-def smooth_maps(maps: FlatMaps, table: Array, seed: int = 0) -> FlatMaps:
+def smooth_maps(maps: FlatMaps, table: Floats, seed: int = 0) -> FlatMaps:
     """The same of pixels that differ by gain alone, independent of their neighbours, and the maps' shading."""
     gain = 1.0 + two_levels(maps).gain * np.random.default_rng(seed).standard_normal(maps.lit.shape)
     dim = np.where(maps.counted, maps.dim, np.median(maps.dim[maps.counted]))
@@ -71,7 +70,7 @@ def smooth_maps(maps: FlatMaps, table: Array, seed: int = 0) -> FlatMaps:
     return simulated_maps(FlatMaps(lit, dim, maps.dark, np.ones_like(maps.counted)), table, seed)
 
 
-def gathered(level: Array, interval: int) -> float:
+def gathered(level: Floats, interval: int) -> float:
     """Pixels whose counts are those of a whole interval, over what the counts 2 to 12 beside these lead to expect."""
     n = np.round(level[np.isfinite(level)] * FRAMES).astype(np.int64)
     low = FRAMES // interval
@@ -80,7 +79,7 @@ def gathered(level: Array, interval: int) -> float:
     return float(10.0 * at / max(beside, 1))
 
 
-def next_to_each_other(level: Array) -> Array:
+def next_to_each_other(level: Floats) -> Floats:
     """Correlation of a map's grain, the shading removed, with that of the next pixel along the row, down the column."""
     level = np.where(np.isfinite(level), level, np.nanmedian(level))
     grain = level / split_shading(level)[0] - 1.0

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from benchmarks.check_measured import record_wall
 from spikecam_env.calibration.real import plausible_rates, read_spikes
 from spikecam_env.gap.observe.bit_passes import BESIDE_WHOLE
-from spikecam_env.gap.observe.observation import Observation, observe
+from spikecam_env.gap.observe.observation import ObservedRecording, observe
 from spikecam_env.sensor import SensorModel
 from spikecam_env.sensor.effects.clock_feedthrough import ClockFeedthrough
 from spikecam_env.sensor.effects.readout_skew import ReadoutSkew
@@ -50,7 +50,7 @@ def static_pixels(spikes: NDArray[np.uint8]) -> NDArray[np.bool_]:
     return static
 
 
-def by_row(seen: Observation, static: NDArray[np.bool_]) -> list[tuple[float, float, float]]:
+def by_row(seen: ObservedRecording, static: NDArray[np.bool_]) -> list[tuple[float, float, float]]:
     """Of each band of rows: pixels within AT_WHOLE; late and early of 10 000 spikes of pixels near a whole interval."""
     interval = 1.0 / np.where(seen.rate > 0, seen.rate, 1.0)
     off = np.abs(interval - np.round(interval))

@@ -27,8 +27,7 @@ from spikecam_env.calibration.real import read_spikes
 from spikecam_env.calibration.response import rates_from_times
 from spikecam_env.calibration.spike_times import spike_times
 from spikecam_env.streams import pack_frames
-
-Array = NDArray[np.float64]
+from spikecam_env.types import Floats
 
 NEAR = 0.1
 """Distance from a whole interval up to which pixels are compared [frames]; the wall's c gathers within 0.05."""
@@ -46,7 +45,7 @@ DRAWS = 4
 """Simulated pixels for each of the wall's."""
 
 
-def halves(spikes: NDArray[np.uint8]) -> tuple[Array, Array]:
+def halves(spikes: NDArray[np.uint8]) -> tuple[Floats, Floats]:
     """(P,) mean intervals [frames] of the first and of the second half of (T, P) spikes, by first and last spike."""
     middle = len(spikes) // 2
     both = []
@@ -59,7 +58,7 @@ def halves(spikes: NDArray[np.uint8]) -> tuple[Array, Array]:
 class Expected:
     """Means of what belongs to a measured interval, by its cell of rows and distance from a whole interval."""
 
-    def __init__(self, measured: Array, row: NDArray[np.int64], values: Array) -> None:
+    def __init__(self, measured: Floats, row: NDArray[np.int64], values: Floats) -> None:
         """values: (P,) intervals [frames], of which the difference from `measured` is averaged."""
         key, inside = self._cells(measured, row)
         size = int(key.max()) + 1
@@ -67,13 +66,13 @@ class Expected:
         total = np.bincount(key[inside], (values - measured)[inside], minlength=size)
         self.shift = np.where(number >= 20, total / np.maximum(number, 1), 0.0)
 
-    def of(self, measured: Array, row: NDArray[np.int64]) -> Array:
+    def of(self, measured: Floats, row: NDArray[np.int64]) -> Floats:
         key, inside = self._cells(measured, row)
         known = inside & (key < self.shift.size)
         return measured + np.where(known, self.shift[np.where(known, key, 0)], 0.0)
 
     @staticmethod
-    def _cells(measured: Array, row: NDArray[np.int64]) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
+    def _cells(measured: Floats, row: NDArray[np.int64]) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
         off = measured - np.round(measured)
         across = round(2 * NEAR / CELL)
         cell = np.floor((off + NEAR) / CELL + 0.5)
@@ -83,7 +82,7 @@ class Expected:
         return key, inside
 
 
-def rms(values: Array) -> float:
+def rms(values: Floats) -> float:
     return float(np.sqrt(np.mean(values**2)))
 
 

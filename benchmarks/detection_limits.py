@@ -30,7 +30,7 @@ from spikecam_env.gap.fit.standard_case import FRAMES, SHAPE, standard_case
 from spikecam_env.gap.observe.conditions import planned_conditions
 from spikecam_env.gap.screen.templates import shipped_templates
 from spikecam_env.gap.settings import UnitSettings
-from spikecam_env.gap.statistics import Key
+from spikecam_env.gap.statistics import StatisticKey
 from spikecam_env.sensor import CATALOGUE, SensorModel
 from tests.hidden_world.catalogue import CATALOGUE as HIDDEN
 
@@ -62,7 +62,7 @@ def of_a_reset() -> float:
     return 1e3 * model.circuit.swing_V * float(np.sqrt((UnitSettings().usual_noise - 1.0) * s2))
 
 
-def heard(keys: Sequence[Key]) -> NDArray[np.bool_]:
+def heard(keys: Sequence[StatisticKey]) -> NDArray[np.bool_]:
     """(S,) which statistics are of recordings that the alarm hears and a fit may take."""
     names = {c.name for c in planned_conditions(standard_design(), SHAPE, FRAMES) if c.use == "fit" or c.moves}
     return np.array([k.recording in names for k in keys])

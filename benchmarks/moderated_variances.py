@@ -13,7 +13,6 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.special import ndtr
 from tqdm import tqdm
 
@@ -23,13 +22,12 @@ from spikecam_env.gap.fit.standard_case import standard_case
 from spikecam_env.gap.settings import Judging
 from spikecam_env.gap.twins.case import twins
 from spikecam_env.gap.unit.refit import constrained_refit
-
-Array = NDArray[np.float64]
+from spikecam_env.types import Floats
 
 TWINS, COUNT, DRAWS, SHIFT = 96, 12, 200, 6.0
 
 
-def as_they_scatter(null: Null, values: Array) -> Null:
+def as_they_scatter(null: Null, values: Floats) -> Null:
     """The null whose variances are those of its own twins (n, S), each by itself."""
     return replace(null, sd=values.std(axis=0, ddof=1), freedom=len(values) - 1)
 
@@ -42,7 +40,7 @@ if __name__ == "__main__":
     values = np.array([[bank[k] for k in whole.keys] for bank in banks])
     exact = as_they_scatter(whole, values).noise
     group = np.array([k.group for k in whole.keys])
-    off: dict[str, list[Array]] = {"scatter": [], "moderated": []}
+    off: dict[str, list[Floats]] = {"scatter": [], "moderated": []}
     alarms, seen = dict.fromkeys(off, 0), dict.fromkeys(off, 0.0)
     rng = np.random.default_rng(0)
     for _ in range(DRAWS):

@@ -14,7 +14,7 @@ import argparse
 import numpy as np
 from numpy.typing import NDArray
 
-from spikecam_env.gap.baseline.motion import Motion, find_motion
+from spikecam_env.gap.baseline.motion import DetectedMotion, find_motion
 from spikecam_env.gap.observe.conditions import Condition
 from spikecam_env.gap.observe.observation import observe
 from spikecam_env.sensor import CATALOGUE, Keyframes, SensorModel, SpikeSensor
@@ -44,7 +44,9 @@ def picture(shape: tuple[int, int] = SHAPE) -> NDArray[np.float32]:
     return np.kron(patches, np.ones((shape[0] // 8, shape[1] // 8))).astype(np.float32)
 
 
-def looked_at(model: SensorModel, light: NDArray[np.float32] | Keyframes, frames: int, seed: int) -> Motion | None:
+def looked_at(
+    model: SensorModel, light: NDArray[np.float32] | Keyframes, frames: int, seed: int
+) -> DetectedMotion | None:
     """What moves in a simulated recording of an unknown scene."""
     sensor = SpikeSensor(model, SHAPE, seed)
     seen = observe(pack_frames(sensor.step(light, frames)), SHAPE)

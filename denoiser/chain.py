@@ -19,12 +19,12 @@ from torch import nn
 from denoiser import infer
 from denoiser.pixel_map import PixelMap
 from denoiser.recipe import Recipe
-from denoiser.window import RollingWindow, Window, check_like
+from denoiser.window import PassWindow, RollingWindow, check_like
 
 Rates = NDArray[np.float32]
 
 
-class Chain:
+class PassChain:
     """Passes over one stream from frame `first` on; what a pass leaves, the next gets.
 
     The chain knows nothing of the frames before: to its network the stream begins there, as streams do in training.
@@ -63,7 +63,7 @@ class Chain:
         """(K, H, W) more frames -> the passes they complete: first frame, and rates (count, H, W)."""
         return map(self._passed, self.windows(chunk))
 
-    def windows(self, chunk: NDArray[np.uint8]) -> Iterator[Window]:
+    def windows(self, chunk: NDArray[np.uint8]) -> Iterator[PassWindow]:
         """`push` for a caller that runs the network: the passes that (K, H, W) more frames complete.  Each is to go
         through `passed` before the next is asked for."""
         skip = min(self._first - self._skipped, len(chunk))
@@ -95,11 +95,11 @@ class Chain:
         """What the last pass left for the next."""
         return self._carried
 
-    def wants(self, window: Window) -> bool:
+    def wants(self, window: PassWindow) -> bool:
         """Whether the network is to be run for this window, or its last plane held."""
         return window.start % self._stride == 0 or self._held is None
 
-    def passed(self, window: Window, found: tuple[Rates, infer.Carried] | None) -> tuple[int, Rates]:
+    def passed(self, window: PassWindow, found: tuple[Rates, infer.Carried] | None) -> tuple[int, Rates]:
         """The first frame of a pass, and its rates; found: what the network gave, None where it was not run."""
         if found is not None:
             self._held, self._carried = found
@@ -107,7 +107,7 @@ class Chain:
         self._window.learn(window, self._held)
         return self._first + window.start, self._held
 
-    def _passed(self, window: Window) -> tuple[int, Rates]:
+    def _passed(self, window: PassWindow) -> tuple[int, Rates]:
         wanted = self.wants(window)
         return self.passed(window, infer.rates(self._network, window, self._type, self._carried) if wanted else None)
 

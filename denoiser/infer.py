@@ -17,7 +17,7 @@ from denoiser.number_type import computing_in
 from denoiser.side_by_side import side_by_side
 from denoiser.stream_network import CARRY, MULTIPLE
 from denoiser.threads import where_torch_can
-from denoiser.window import Window
+from denoiser.window import PassWindow
 from spikecam_env.own_code import own_code
 
 
@@ -46,14 +46,17 @@ Carried = tuple[NDArray[np.float32], ...]
 
 
 def rates(
-    network: nn.Module | StreamPasses, window: Window, number_type: torch.dtype, carried: Carried = ()
+    network: nn.Module | StreamPasses, window: PassWindow, number_type: torch.dtype, carried: Carried = ()
 ) -> tuple[NDArray[np.float32], Carried]:
     """Rates (count, H, W) float32 of the frames that the window covers, in [0, 1] [spikes/frame]; what is carried."""
     return rates_of_many(network, [window], number_type, [carried])[0]
 
 
 def rates_of_many(
-    network: nn.Module | StreamPasses, windows: Sequence[Window], number_type: torch.dtype, carried: Sequence[Carried]
+    network: nn.Module | StreamPasses,
+    windows: Sequence[PassWindow],
+    number_type: torch.dtype,
+    carried: Sequence[Carried],
 ) -> list[tuple[NDArray[np.float32], Carried]]:
     """`rates` of windows of one size, of as many streams, in one pass of the network."""
     return where_torch_can(lambda: _rates(network, windows, number_type, carried))
@@ -61,7 +64,7 @@ def rates_of_many(
 
 def _rates(
     network: Any,
-    windows: Sequence[Window],
+    windows: Sequence[PassWindow],
     number_type: torch.dtype,
     carried: Sequence[Carried],
 ) -> list[tuple[NDArray[np.float32], Carried]]:
@@ -84,7 +87,7 @@ def on_host(tensor: Tensor) -> NDArray[Any]:
 
 def _as_in_training(
     network: nn.Module,
-    windows: Sequence[Window],
+    windows: Sequence[PassWindow],
     number_type: torch.dtype,
     carried: Sequence[Carried],
     device: torch.device,
@@ -101,7 +104,7 @@ def _as_in_training(
 
 def _side_by_side(
     network: StreamPasses,
-    windows: Sequence[Window],
+    windows: Sequence[PassWindow],
     number_type: torch.dtype,
     carried: Sequence[Carried],
     device: torch.device,

@@ -17,9 +17,9 @@ import torch
 from numpy.typing import NDArray
 
 from denoiser import infer
-from denoiser.chain import Chain, Rates
+from denoiser.chain import PassChain, Rates
 from denoiser.online import OnlineDnSS
-from denoiser.window import Window
+from denoiser.window import PassWindow
 from spikecam_env.checked import checked_count, checked_shape
 from spikecam_env.errors import InputError
 
@@ -89,7 +89,7 @@ class ManyDnSS:
                 done[stream].append(rates)
         return [np.concatenate(rates) for rates in done]
 
-    def _passed(self, windows: dict[int, Window]) -> Iterator[tuple[int, Rates]]:
+    def _passed(self, windows: dict[int, PassWindow]) -> Iterator[tuple[int, Rates]]:
         """The rates of one window of each of these streams."""
         wanted = {n: window for n, window in windows.items() if self._chains[n].wants(window)}
         carried = [self._chains[n].carried for n in wanted]
@@ -98,11 +98,11 @@ class ManyDnSS:
         for stream, window in windows.items():
             yield stream, self._chains[stream].passed(window, results.get(stream))[1]
 
-    def _chain(self) -> Chain:
+    def _chain(self) -> PassChain:
         return self._like.chain(self.shape)
 
 
-def _rounds(due: list[Iterator[Window]]) -> Iterator[dict[int, Window]]:
+def _rounds(due: list[Iterator[PassWindow]]) -> Iterator[dict[int, PassWindow]]:
     """The next window of every stream that has one, until none has."""
     while True:
         windows = {n: window for n, stream in enumerate(due) if (window := next(stream, None)) is not None}

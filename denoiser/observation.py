@@ -21,7 +21,8 @@ from denoiser.many import ManyDnSS
 from denoiser.online import OnlineDnSS
 from denoiser.recipe import RECIPES
 from spikecam_env.checked import checked_number
-from spikecam_env.envs.observations.protocol import Blocks, Observation, Streams, View, grey, picture_space
+from spikecam_env.envs.observations.protocol import Blocks, CameraView, Observation, grey, picture_space
+from spikecam_env.types import Masks
 
 
 @dataclass(frozen=True)
@@ -43,10 +44,10 @@ class Rate(Observation):
     def __post_init__(self) -> None:
         checked_number(self.white, "white", 0.0, above=True)
 
-    def space(self, view: View) -> spaces.Box:
+    def space(self, view: CameraView) -> spaces.Box:
         return picture_space(view)
 
-    def start(self, view: View, streams: int) -> Denoising:
+    def start(self, view: CameraView, streams: int) -> Denoising:
         if view.device is not None:
             there = ManyDnSS(_denoiser(self.mode, str(view.device)), streams, view.shape)
             return DenoisingThere(there, self.white, view.device)
@@ -74,14 +75,14 @@ class Denoising:
         self.pushed = np.zeros(streams, np.int64)
         self.finished = np.zeros(streams, np.int64)
 
-    def restarted(self, which: Streams) -> Denoising:
+    def restarted(self, which: Masks) -> Denoising:
         """This, with these streams before their first frame."""
         self._denoiser.restart(which)
         for array in self._arrays:
             array[which] = 0
         return self
 
-    def replaced(self, others: Denoising, which: Streams) -> Denoising:
+    def replaced(self, others: Denoising, which: Masks) -> Denoising:
         """This, with other streams in the place of these."""
         self._denoiser.exchange(which, others._denoiser)
         for array, other in zip(self._arrays, others._arrays, strict=True):

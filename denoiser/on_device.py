@@ -3,7 +3,7 @@
     frames -> windows (`denoiser.window_torch`) -> network -> rates
 
 The law is that of `denoiser.chain`, to the rounding of sums: rates differ by less than 1e-5 in float32.  The last
-passes of a stream, over mirrored frames, are made on the host by `Chain`, with the network where it is.
+passes of a stream, over mirrored frames, are made on the host by `PassChain`, with the network where it is.
 """
 
 from __future__ import annotations
@@ -18,12 +18,12 @@ from torch import Tensor, nn
 
 from denoiser import infer
 from denoiser.captured import captured
-from denoiser.chain import Chain, Rates
+from denoiser.chain import PassChain, Rates
 from denoiser.number_type import computing_in
 from denoiser.pixel_map import PixelMap
 from denoiser.recipe import Recipe
 from denoiser.threads import where_torch_can
-from denoiser.window_torch import Windows, learned, pushed
+from denoiser.window_torch import StreamWindows, learned, pushed
 from spikecam_env.errors import InputError
 from spikecam_env.streams.packing import as_spikes
 
@@ -33,7 +33,7 @@ class DeviceStreams:
 
     network: on the device, as `infer.prepared` makes it.  number_type: what it computes in.  unit: calibration map.
     replays: on CUDA, a pass of all streams is recorded once and replayed.
-    Raises InputError for a network of one plane a pass, and for a layout that `Windows` cannot begin.
+    Raises InputError for a network of one plane a pass, and for a layout that `StreamWindows` cannot begin.
     """
 
     def __init__(
@@ -52,7 +52,7 @@ class DeviceStreams:
             raise InputError("a device takes networks of many planes a pass, as mode 'best' is; leave device out")
         self.layout, self.shape, self.device = recipe.layout, shape, device
         self._network, self._type, self._unit = network, number_type, unit
-        self._windows = Windows.begin(self.layout, streams, shape, device)
+        self._windows = StreamWindows.begin(self.layout, streams, shape, device)
         self._calibrate()
         self._carried = tuple(torch.zeros((streams, *size), device=device) for size in recipe.carries(shape))
         self._new = self._frames(streams, self.layout.planes)
@@ -178,13 +178,13 @@ class DeviceStreams:
 
 
 class DeviceChain:
-    """What `Chain` is, on a device: rates are tensors there.
+    """What `PassChain` is, on a device: rates are tensors there.
 
-    streams: one.  host: a `Chain` with the same network, for the state's form and a stream's last passes.
+    streams: one.  host: a `PassChain` with the same network, for the state's form and a stream's last passes.
     first: frame of the stream from which on there are passes.
     """
 
-    def __init__(self, streams: DeviceStreams, host: Chain, first: int = 0) -> None:
+    def __init__(self, streams: DeviceStreams, host: PassChain, first: int = 0) -> None:
         self._streams, self._host = streams, host
         self._first, self._skipped = first, 0
         self._over = False  # the host goes on

@@ -21,7 +21,7 @@ from numpy.typing import ArrayLike, NDArray
 from torch import nn
 
 from denoiser import accumulate, infer, mus
-from denoiser.chain import Chain, Crossfade, Rates
+from denoiser.chain import Crossfade, PassChain, Rates
 from denoiser.given_network import check_network, has_passes
 from denoiser.number_type import PRECISIONS, number_type
 from denoiser.on_device import DeviceChain, DeviceStreams, kept, spikes_on, unpacked_on
@@ -29,7 +29,7 @@ from denoiser.openvino_passes import OpenvinoPasses
 from denoiser.pixel_map import PixelMap
 from denoiser.recipe import Recipe
 from denoiser.weights import digest, load_weights, pretrained_path
-from denoiser.window import Window, check_like
+from denoiser.window import PassWindow, check_like
 from spikecam_env.calibration import Calibration
 from spikecam_env.checked import checked_count
 from spikecam_env.errors import InputError, NotReadyError, unknown_name
@@ -238,11 +238,11 @@ class OnlineDnSS:
         self._chains, self._mixing = other._chains, other._mixing
         self._decoding, self._ended = other._decoding, other._ended
 
-    def chain(self, shape: tuple[int, int], first: int = 0) -> Chain:
+    def chain(self, shape: tuple[int, int], first: int = 0) -> PassChain:
         """Passes of this network over another stream, from its frame `first` on: for those who denoise many."""
         self._check_map(shape)
         options: dict[str, Any] = {"unit": self._unit, "stride": self._stride, "first": first}
-        return Chain(self._recipe, self._network, self._type, shape, **options)
+        return PassChain(self._recipe, self._network, self._type, shape, **options)
 
     def streams_on_device(self, streams: int, shape: tuple[int, int]) -> DeviceStreams:
         """Passes of this network over other streams, on the device."""
@@ -255,7 +255,7 @@ class OnlineDnSS:
         if self._unit is not None and self._unit.gain.shape != shape:
             raise InputError(f"the calibration map has shape {self._unit.gain.shape}, the stream's frames {shape}")
 
-    def passes(self, windows: list[Window], carried: list[infer.Carried]) -> list[tuple[Rates, infer.Carried]]:
+    def passes(self, windows: list[PassWindow], carried: list[infer.Carried]) -> list[tuple[Rates, infer.Carried]]:
         """Rates of the windows of as many streams, and what each leaves, in one pass of the network."""
         return infer.rates_of_many(self._network, windows, self._type, carried)
 
@@ -265,7 +265,7 @@ class OnlineDnSS:
         self._mixing = Crossfade(self._recipe.layout.planes, shape) if self._overlap else None
         self._decoding = _DECODERS[self._decoder].start(shape)
 
-    def _own_chain(self, shape: tuple[int, int], first: int) -> Chain | DeviceChain:
+    def _own_chain(self, shape: tuple[int, int], first: int) -> PassChain | DeviceChain:
         chain = self.chain(shape, first)
         return chain if self._device is None else DeviceChain(self.streams_on_device(1, shape), chain, first)
 

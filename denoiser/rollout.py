@@ -29,7 +29,7 @@ from denoiser.number_type import computing_in, number_type
 from denoiser.simulated import Bank, SimulatedStreams, in_turn
 from denoiser.stream_network import CARRY
 from denoiser.window import WindowLayout
-from denoiser.window_torch import Windows, learned, pushed
+from denoiser.window_torch import StreamWindows, learned, pushed
 
 OFFSET = 0.02
 """Rate below which errors weigh the same [spikes/frame]; chosen here."""
@@ -94,7 +94,7 @@ class Rollouts:
 
     taken: streams a step.  pool: streams for each of them.  patch: their side [pixels].  seed: everything follows from
     it.  bank, compiled: as for `SimulatedStreams`.  teacher: a network of the same layout, whose rates are wanted
-    instead of the light.  Raises InputError for a layout that `Windows` cannot begin.
+    instead of the light.  Raises InputError for a layout that `StreamWindows` cannot begin.
     """
 
     def __init__(
@@ -115,7 +115,7 @@ class Rollouts:
         self.streams = SimulatedStreams(count, patch, device, seed, bank=bank, compiled=compiled, twins=("noisy",))
         self._type = number_type("auto", device)
         self._next = torch.zeros((), dtype=torch.int64, device=device)
-        self._windows = Windows.begin(layout, count, (patch, patch), device)
+        self._windows = StreamWindows.begin(layout, count, (patch, patch), device)
         self._past = _Past.begin(layout, count, patch, device, teacher is not None)
 
     def loss(self, network: nn.Module, passes: int) -> Tensor:
@@ -172,7 +172,7 @@ class Rollouts:
         for name, value in vars(past).items():
             getattr(self._past, name)[rows] = value.detach()
 
-    def _calibrated(self, windows: Windows, begins: Tensor, rows: Tensor) -> None:
+    def _calibrated(self, windows: StreamWindows, begins: Tensor, rows: Tensor) -> None:
         """Give the streams that begin a map, or none; in place."""
         gain, dark = self.streams.unit(rows)
         low, high = map(math.log, MAP_ERRORS)

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from torch import Tensor
 
 from denoiser.strips import share_rows
-from denoiser.window import Window
+from denoiser.window import PassWindow
 from spikecam_env.compiled import njit
 
 Bits: TypeAlias = "NDArray[np.uint16] | NDArray[np.uint32]"
@@ -25,7 +25,7 @@ _ONE = {torch.bfloat16: np.uint16(0x3F80), torch.float32: np.uint32(0x3F800000)}
 
 
 def side_by_side(
-    windows: Sequence[Window],
+    windows: Sequence[PassWindow],
     last: Sequence[NDArray[np.float32] | None],
     number_type: torch.dtype,
     multiple: int,

@@ -78,7 +78,7 @@ CONTRAST = (2.0, 50.0)
 
 
 @dataclass(frozen=True)
-class Simulated:
+class StreamBlock:
     """The next frames of all streams (or of those asked for).
 
     spikes: of each twin that is simulated, (B, K, H, W) uint8, 0 or 1.  light: (B, K, H, W) float32 in [0, 1], each
@@ -194,7 +194,7 @@ class SimulatedStreams:
         self._state["age"] = torch.floor(spread * self._state["length"] / AGE_STEP) * AGE_STEP
         self._fresh = torch.ones(count, dtype=torch.bool, device=self.device)
 
-    def advance(self, frames: int, rows: Tensor | None = None) -> Simulated:
+    def advance(self, frames: int, rows: Tensor | None = None) -> StreamBlock:
         """The next `frames` frames of all streams, or of those in `rows` (int64), each row once."""
         rows = torch.arange(self.count, device=self.device) if rows is None else rows
         mine = {name: value[rows] for name, value in self._state.items()}
@@ -209,7 +209,7 @@ class SimulatedStreams:
         for name, value in mine.items():
             self._state[name][rows] = value
         light = ((pictures[:, :-1] + pictures[:, 1:]) / 2).clamp(0.0, 1.0)
-        return Simulated(spikes, light, begins)
+        return StreamBlock(spikes, light, begins)
 
     def unit(self, rows: Tensor) -> tuple[Tensor, Tensor]:
         """True gain and dark rate [spikes/frame] of the units of these streams, (B, H, W) float32 each."""

@@ -166,7 +166,7 @@ def _trained(config: TrainConfig, progress: bool) -> Path:
         bank=Bank.drawn(config.seed, device, streams=config.steps * config.batch, progress=progress),
         compiled=config.compiled or device.type == "cuda",
     )
-    judge = Judge(recipe, config.seed + VALIDATION_SEED, device, config.validate_passes)
+    judge = Validator(recipe, config.seed + VALIDATION_SEED, device, config.validate_passes)
     return learn(
         config,
         run,
@@ -178,7 +178,7 @@ def _trained(config: TrainConfig, progress: bool) -> Path:
     )
 
 
-class Source(Protocol):
+class TrainingSource(Protocol):
     """What a network learns from and is judged by."""
 
     streams: SimulatedStreams
@@ -190,13 +190,13 @@ class Source(Protocol):
         """Mean squared errors against the light, by what guessed it."""
 
 
-def source(recipe: Recipe, *, seed: int, **options: Any) -> Source:
+def source(recipe: Recipe, *, seed: int, **options: Any) -> TrainingSource:
     """Streams for a recipe: `Rollouts` for the light, `IntervalWindows` for the clean interval."""
     kind = IntervalWindows if recipe.target == "clean_inverse_interval" else Rollouts
     return kind(recipe.layout, seed=seed, **options)
 
 
-def stepper(run: Run, streams: Source, passes: int) -> Callable[[], Tensor]:
+def stepper(run: Run, streams: TrainingSource, passes: int) -> Callable[[], Tensor]:
     """A function that takes one step and returns its loss, which a GPU need not have worked out yet."""
 
     def step() -> Tensor:
@@ -210,7 +210,7 @@ def stepper(run: Run, streams: Source, passes: int) -> Callable[[], Tensor]:
     return captured(step, streams.streams.device, streams.streams.rng)
 
 
-class Judge:
+class Validator:
     """Held-out streams, the same at every validation."""
 
     def __init__(self, recipe: Recipe, seed: int, device: torch.device, passes: int) -> None:

@@ -80,7 +80,7 @@ class WindowLayout:
 
 
 @dataclass(frozen=True)
-class Window:
+class PassWindow:
     """One pass: the frames it covers are start .. start + count of the stream."""
 
     start: int
@@ -104,7 +104,7 @@ class RollingWindow:
         self._averaged = 0  # frames in the running means
         self._sums = np.zeros((2, *shape), np.float32)  # of spikes and of rates, for the gain
 
-    def push(self, chunk: NDArray[np.uint8], wanted: Container[int] | None = None) -> Iterator[Window]:
+    def push(self, chunk: NDArray[np.uint8], wanted: Container[int] | None = None) -> Iterator[PassWindow]:
         """(K, H, W) more frames -> the passes they complete; with `wanted`, only those that start in it."""
         self._frames = np.concatenate([self._frames, chunk])
         self.seen += len(chunk)
@@ -113,14 +113,14 @@ class RollingWindow:
                 yield self._window()
             self._advance()
 
-    def end(self, wanted: Container[int] | None = None) -> Iterator[Window]:
+    def end(self, wanted: Container[int] | None = None) -> Iterator[PassWindow]:
         """The stream is over: the passes that are left, over mirrored frames."""
         while self.start < self.seen:
             if wanted is None or self.start in wanted:
                 yield self._window()
             self._advance()
 
-    def learn(self, window: Window, rates: NDArray[np.float32]) -> None:
+    def learn(self, window: PassWindow, rates: NDArray[np.float32]) -> None:
         """Take in the rates (count, H, W) found for a window, for the gain of later ones."""
         if self.layout.gain_memory > 0:
             covered = window.spikes[self.layout.past : self.layout.past + window.count]
@@ -150,7 +150,7 @@ class RollingWindow:
         self._means = state["means"].copy()
         self._sums = state["sums"].copy()
 
-    def _window(self) -> Window:
+    def _window(self) -> PassWindow:
         layout = self.layout
         first, stop = self.start - layout.past, self.start + layout.planes + layout.future
         held = self.seen - len(self._frames)  # index of the first frame held
@@ -173,7 +173,7 @@ class RollingWindow:
         spikes = known
         if first < 0 or stop > self.seen:
             spikes = known[_mirror(np.arange(first, stop), self.seen) - known_first]
-        return Window(self.start, min(layout.planes, self.seen - self.start), spikes, planes)
+        return PassWindow(self.start, min(layout.planes, self.seen - self.start), spikes, planes)
 
     def _calibrate(self, planes: NDArray[np.float32]) -> None:
         """Take the pixel's gain out of the planes and say what it is; in place."""

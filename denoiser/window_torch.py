@@ -18,7 +18,7 @@ from spikecam_env.errors import InputError
 
 
 @dataclass
-class Windows:
+class StreamWindows:
     """N streams mid-way; times are frames of the window, whose frame 0 is frame start - past of the stream.
 
     frames: (N, span, H, W) uint8.  start: (N,) int64, the first covered frame.  last: (N, H, W) int32, time of the last
@@ -38,7 +38,7 @@ class Windows:
     mapped: Tensor
 
     @classmethod
-    def begin(cls, layout: WindowLayout, streams: int, shape: tuple[int, int], device: torch.device) -> Windows:
+    def begin(cls, layout: WindowLayout, streams: int, shape: tuple[int, int], device: torch.device) -> StreamWindows:
         """Before the first frames of every stream; raises InputError for a layout that cannot begin a pass early."""
         if layout.future != layout.planes or layout.past > layout.planes:
             raise InputError(f"{layout}: future must be planes, and past no more, for windows in torch")
@@ -58,17 +58,17 @@ class Windows:
             zeros(),
         )
 
-    def rows(self, rows: Tensor) -> Windows:
+    def rows(self, rows: Tensor) -> StreamWindows:
         """Copies of some streams."""
-        return Windows(**{name: value[rows] for name, value in vars(self).items()})
+        return StreamWindows(**{name: value[rows] for name, value in vars(self).items()})
 
-    def put(self, rows: Tensor, others: Windows) -> None:
+    def put(self, rows: Tensor, others: StreamWindows) -> None:
         """Write streams back."""
         for name, value in vars(others).items():
             getattr(self, name)[rows] = value
 
 
-def pushed(layout: WindowLayout, w: Windows, new: Tensor, begins: Tensor) -> tuple[Windows, Tensor]:
+def pushed(layout: WindowLayout, w: StreamWindows, new: Tensor, begins: Tensor) -> tuple[StreamWindows, Tensor]:
     """The next pass: (N, planes, H, W) new frames -> windows and planes (N, layers, H, W) float32.
 
     begins: (N,) bool; these streams begin with `new`, and their pass covers the frames before them.
@@ -92,14 +92,14 @@ def pushed(layout: WindowLayout, w: Windows, new: Tensor, begins: Tensor) -> tup
     gain = mapped * w.gain + (1 - mapped) * found
     planes = ((planes - (mapped * w.dark)[:, None]) / gain[:, None]).clamp(min=0.0)
     planes = torch.cat([planes, 4 * (gain - 1)[:, None], mapped.expand_as(gain)[:, None]], dim=1)
-    return Windows(frames, start, latest - count, means, averaged, sums, w.gain, w.dark, w.mapped), planes
+    return StreamWindows(frames, start, latest - count, means, averaged, sums, w.gain, w.dark, w.mapped), planes
 
 
-def learned(layout: WindowLayout, w: Windows, rates: Tensor) -> Windows:
+def learned(layout: WindowLayout, w: StreamWindows, rates: Tensor) -> StreamWindows:
     """Take in the rates (N, planes, H, W) of a pass, for the gain of later ones."""
     covered = w.frames[:, layout.past : layout.past + layout.planes].sum(dim=1).float()
     sums = w.sums * (1 - 1 / layout.gain_memory) ** layout.planes + torch.stack([covered, rates.sum(dim=1)], dim=1)
-    return Windows(**{**vars(w), "sums": torch.where((w.start >= 0)[:, None, None, None], sums, w.sums)})
+    return StreamWindows(**{**vars(w), "sums": torch.where((w.start >= 0)[:, None, None, None], sums, w.sums)})
 
 
 def _averaged(layout: WindowLayout, means: Tensor, new: Tensor) -> Tensor:

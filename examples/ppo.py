@@ -15,7 +15,7 @@ import spikecam_env  # noqa: F401  (registers the environments)
 from denoiser.run import Run
 from spikecam_env.agents import evaluate
 from spikecam_env.agents.agent import Agent
-from spikecam_env.agents.policy import Recipe
+from spikecam_env.agents.policy import PolicyRecipe
 from spikecam_env.agents.ppo import PPO, train
 
 STEPS = int(sys.argv[1]) if len(sys.argv) > 1 else 49_152
@@ -26,7 +26,7 @@ torch.set_num_threads(1)
 cameras = gymnasium.make_vec(
     "spikecam_env/Catch-v1", num_envs=16, vectorization_mode="vector_entry_point", obs="tfp", obs_state=True
 )
-recipe = Recipe(channels=1, shape=(64, 64), high=255, lags=(0, 2, 5), actions=1)
+recipe = PolicyRecipe(channels=1, shape=(64, 64), high=255, lags=(0, 2, 5), actions=1)
 policy = recipe.network()
 run = Run.begin(policy)
 

@@ -26,7 +26,7 @@ _AT_REST = Gaze.fixed(0.0, 0.0)
 
 
 @dataclass(frozen=True, eq=False)
-class Path:
+class PiecewisePath:
     """Straight pieces from place to place; at rest before the first and after the last.
 
     frame  (n,) rising [frames]
@@ -37,12 +37,12 @@ class Path:
     place: NDArray[np.float64]
 
     @classmethod
-    def still(cls, x: float, y: float) -> Path:
+    def still(cls, x: float, y: float) -> PiecewisePath:
         """Always there."""
         return cls(np.zeros(1), np.array([[x, y]], np.float64))
 
     @classmethod
-    def straight(cls, start: tuple[float, float], velocity: tuple[float, float], frames: float) -> Path:
+    def straight(cls, start: tuple[float, float], velocity: tuple[float, float], frames: float) -> PiecewisePath:
         """From `start` on for so many frames, at a velocity [pixels/frame]."""
         ends = np.array([start, np.asarray(start) + frames * np.asarray(velocity)], np.float64)
         return cls(np.array([0.0, frames]), ends)
@@ -80,7 +80,7 @@ class Disc:
 
     texels: Texels
     radius: float
-    path: Path
+    path: PiecewisePath
     rpm: float = 0.0
     angle: float = 0.0
 

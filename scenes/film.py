@@ -21,10 +21,12 @@ import numpy as np
 from numpy.typing import NDArray
 from tqdm import tqdm
 
-from scenes.frames import ALONE, Stored, stored
+from scenes.frames import ALONE, StoredPicture, stored
 from scenes.pictures import check_size, pictures_in, pictures_timed, read_picture
-from scenes.transfer import Array, grey, light_of
+from scenes.transfer import grey, light_of
 from spikecam_env.errors import InputError
+from spikecam_env.renamed import old_names
+from spikecam_env.types import Pictures
 from spikecam_env.untrusted import existing_file
 
 UNSTATED_TRANSFER = "gamma2.2"
@@ -36,7 +38,7 @@ NOT_VIDEO = ("tty", "hls", "concat", "dash")
 
 
 @dataclass(frozen=True)
-class Reading:
+class FilmOptions:
     """How a film is to be read.
 
     shape         (rows, columns) to which each picture is cut and averaged; None: as they are
@@ -71,7 +73,7 @@ class Film:
     bits      of a value
     """
 
-    light: list[Array]
+    light: list[Pictures]
     time_s: NDArray[np.float64]
     rate_hz: float | None
     last_s: float
@@ -91,7 +93,7 @@ class _Source:
     last_s      for how long the last picture is seen
     """
 
-    pictures: Iterator[tuple[Stored, Fraction | float | None]]
+    pictures: Iterator[tuple[StoredPicture, Fraction | float | None]]
     rate: Fraction | None = None
     tick_s: Fraction = Fraction(0)
     count: int | None = None
@@ -101,7 +103,7 @@ class _Source:
     last_s: float | None = None
 
 
-def read_film(path: str | PathLike[str], how: Reading) -> Film:
+def read_film(path: str | PathLike[str], how: FilmOptions) -> Film:
     """The film in a file or folder.
 
     Warns where a file holds fewer pictures than it states, and where it states no transfer.
@@ -109,7 +111,7 @@ def read_film(path: str | PathLike[str], how: Reading) -> Film:
     are missing or do not rise, a transfer that is unknown, or not stated for values of more than 8 bits.
     """
     where = str(path)
-    light: list[Array] = []
+    light: list[Pictures] = []
     stamps: list[Any] = []
     transfer, bits = "", 8
     kind: tuple[Any, ...] = ()
@@ -157,7 +159,7 @@ def read_array(path: str | PathLike[str]) -> NDArray[Any]:
         raise InputError(f"{path} is not an .npy file of plain numbers ({error})") from error
 
 
-def fitted(picture: Array, shape: tuple[int, int] | None) -> Array:
+def fitted(picture: Pictures, shape: tuple[int, int] | None) -> Pictures:
     """The middle of the picture that has the shape's proportions, at its size."""
     if shape is None or picture.shape == tuple(shape):
         return picture
@@ -174,7 +176,7 @@ def fitted(picture: Array, shape: tuple[int, int] | None) -> Array:
 
 
 @contextmanager
-def _opened(path: Path, how: Reading) -> Iterator[_Source]:
+def _opened(path: Path, how: FilmOptions) -> Iterator[_Source]:
     try:
         is_folder = path.is_dir()
     except (OSError, ValueError) as error:  # a name too long, or with a zero in it
@@ -238,7 +240,9 @@ def _video(path: Path) -> Iterator[_Source]:
         ) from error
 
 
-def _decoded(container: Any, stream: Any, source: _Source, path: Path) -> Iterator[tuple[Stored, Fraction | None]]:
+def _decoded(
+    container: Any, stream: Any, source: _Source, path: Path
+) -> Iterator[tuple[StoredPicture, Fraction | None]]:
     """Pictures in the order of their times, as far as the file is whole."""
     import av
 
@@ -266,7 +270,7 @@ def _duration(container: Any, stream: Any) -> float | None:
 # -- what they mean --------------------------------------------------------------------------------------------
 
 
-def _transfer(picture: Stored, how: Reading, source: _Source, where: str) -> str:
+def _transfer(picture: StoredPicture, how: FilmOptions, source: _Source, where: str) -> str:
     """By which the film is decoded: the user's word, else the file's."""
     stated = how.transfer or picture.transfer
     if stated is not None:
@@ -288,11 +292,11 @@ def _transfer(picture: Stored, how: Reading, source: _Source, where: str) -> str
     return source.transfer
 
 
-def _kind(picture: Stored) -> tuple[Any, ...]:
+def _kind(picture: StoredPicture) -> tuple[Any, ...]:
     return (picture.values.shape, picture.bits, picture.transfer)
 
 
-def _past(stamps: list[Any], how: Reading) -> bool:
+def _past(stamps: list[Any], how: FilmOptions) -> bool:
     """Whether the last picture read lies at or beyond the time that is wanted."""
     if how.seconds is None:
         return False
@@ -306,7 +310,9 @@ def _past(stamps: list[Any], how: Reading) -> bool:
     return float(stamps[-1] - stamps[0]) / how.slow >= how.seconds
 
 
-def _times(stamps: list[Any], source: _Source, how: Reading, where: str) -> tuple[NDArray[np.float64], float | None]:
+def _times(
+    stamps: list[Any], source: _Source, how: FilmOptions, where: str
+) -> tuple[NDArray[np.float64], float | None]:
     """Of the pictures, from the first [s]; and pictures a second where that is constant."""
     if how.film_rate_hz is not None:
         return np.arange(len(stamps)) / how.film_rate_hz, how.film_rate_hz
@@ -334,7 +340,7 @@ def _is_tick(stamp: Any, time: Any, tick_s: Fraction) -> bool:
     return bool(stamp == time or abs(stamp - time) < tick_s)
 
 
-def given_times(times_s: NDArray[np.float64], pictures: int, how: Reading, where: str) -> NDArray[np.float64]:
+def given_times(times_s: NDArray[np.float64], pictures: int, how: FilmOptions, where: str) -> NDArray[np.float64]:
     """The user's times of so many pictures, from the first [s].
 
     Errors: InputError where there is not one for each, or they are not finite and rising.
@@ -348,7 +354,7 @@ def given_times(times_s: NDArray[np.float64], pictures: int, how: Reading, where
     return np.asarray(times[:pictures] - times[0])
 
 
-def _warn_if_cut(pictures: int, end_s: float, source: _Source, how: Reading, where: str) -> None:
+def _warn_if_cut(pictures: int, end_s: float, source: _Source, how: FilmOptions, where: str) -> None:
     """Warn where the file has fewer pictures, or ends earlier, than it states."""
     if source.count is not None and pictures < source.count:
         warnings.warn(
@@ -367,3 +373,6 @@ def _warn_if_cut(pictures: int, end_s: float, source: _Source, how: Reading, whe
             )
     elif source.trouble:
         warnings.warn(f"{where} is damaged: it holds {pictures} pictures{source.trouble}", stacklevel=4)
+
+
+__getattr__ = old_names(__name__, {"Reading": "FilmOptions"})

@@ -16,8 +16,8 @@ from typing import TYPE_CHECKING, Any
 import cv2
 import numpy as np
 
-from scenes.transfer import Array
 from spikecam_env.errors import InputError
+from spikecam_env.types import Pictures
 
 if TYPE_CHECKING:
     from av import VideoFrame
@@ -52,7 +52,7 @@ HIGH_DEFINITION = 720
 
 
 @dataclass(frozen=True)
-class Stored:
+class StoredPicture:
     """A picture as a file stores it.
 
     values     (h, w) or (h, w, 3: red, green, blue) float32; 0..1 of full scale, or floats as they are
@@ -61,13 +61,13 @@ class Stored:
     bits       of a value; 32 for floats
     """
 
-    values: Array
+    values: Pictures
     transfer: str | None
     primaries: str
     bits: int
 
 
-def stored(frame: VideoFrame, where: str, turned: bool = True) -> Stored:
+def stored(frame: VideoFrame, where: str, turned: bool = True) -> StoredPicture:
     """A decoded frame as numbers, turned upright as the file says unless `turned` is false.
 
     Errors: InputError, which begins with `where`, for two fields in one frame, transparent pixels, and for a format
@@ -86,7 +86,7 @@ def stored(frame: VideoFrame, where: str, turned: bool = True) -> Stored:
         planes = _rgb(luma, blue, red, *_matrix(frame, where))
     values = planes[0] if len(planes) == 1 else np.stack(planes, -1)
     turns = round(frame.rotation / 90) if turned else 0
-    return Stored(
+    return StoredPicture(
         np.ascontiguousarray(np.rot90(values, turns)),
         stated_transfer(int(frame.color_trc), bits),
         stated_primaries(int(frame.color_primaries)),
@@ -126,7 +126,7 @@ def _planar(frame: VideoFrame, where: str) -> VideoFrame:
     return frame.reformat(format=f"yuv{alpha}444p" if bits <= 8 else f"yuv{alpha}444p{bits}le")
 
 
-def _planes(frame: VideoFrame) -> tuple[list[Array], Array | None, int]:
+def _planes(frame: VideoFrame) -> tuple[list[Pictures], Pictures | None, int]:
     """Planes of colour or grey, alpha where there is some, all float32 of (h, w); and the bits of a value.
 
     Grey, red, green, blue and Y are in 0..1, colour differences in -0.5..0.5.
@@ -150,7 +150,7 @@ def _planes(frame: VideoFrame) -> tuple[list[Array], Array | None, int]:
     return [luma.clip(0, 1), *colour], alpha, bits
 
 
-def _plane(frame: VideoFrame, part: Any) -> Array:
+def _plane(frame: VideoFrame, part: Any) -> Pictures:
     """Codes of a component that has a plane of its own."""
     plane = frame.planes[part.plane]
     order = ">" if frame.format.is_big_endian else "<"
@@ -159,7 +159,7 @@ def _plane(frame: VideoFrame, part: Any) -> Array:
     return rows[: part.height, : part.width].astype(np.float32)
 
 
-def _rgb(luma: Array, blue: Array, red: Array, kr: float, kb: float) -> list[Array]:
+def _rgb(luma: Pictures, blue: Pictures, red: Pictures, kr: float, kb: float) -> list[Pictures]:
     r = luma + np.float32(2 * (1 - kr)) * red
     b = luma + np.float32(2 * (1 - kb)) * blue
     g = (luma - np.float32(kr) * r - np.float32(kb) * b) / np.float32(1 - kr - kb)

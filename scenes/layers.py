@@ -28,8 +28,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scenes.camera import intrinsic
-from scenes.renderers.protocol import Lighting, Pinhole, Renderer, Sprite, Surface, Window
+from scenes.renderers.protocol import Lighting, PictureWindow, Pinhole, Renderer, Sprite, Surface
 from spikecam_env.compiled import njit
+from spikecam_env.types import Floats, Pictures
 
 DENSITY = 3
 """Texels a pixel, one ray each.  On the scene `tumble` 0.9 % rms off 16 x 16 rays a pixel where things move."""
@@ -48,12 +49,9 @@ STEPS = 2
 RIDGE = 1e-4
 """Weight, against one point, that keeps the turn and bend of a sprite seen in few points at rest."""
 
-Array = NDArray[np.float32]
-Floats = NDArray[np.float64]
-
 
 @dataclass(frozen=True, eq=False)
-class Key:
+class BodyKey:
     """A body seen alone at one instant.
 
     tints    (h, w) uint32: light x coverage in the lower 16 bits, full at `brightest`, and coverage in the upper, full
@@ -65,7 +63,7 @@ class Key:
 
     tints: NDArray[np.uint32]
     brightest: float
-    depth: Array
+    depth: Pictures
     points: Floats
     texels: Floats
     lens: Floats
@@ -77,15 +75,21 @@ class Key:
 
 
 def render_key(
-    renderer: Renderer, surface: Surface, pose: Floats, camera: Pinhole, lighting: Lighting, window: Window, gain: float
-) -> Key:
+    renderer: Renderer,
+    surface: Surface,
+    pose: Floats,
+    camera: Pinhole,
+    lighting: Lighting,
+    window: PictureWindow,
+    gain: float,
+) -> BodyKey:
     """The surface at a pose in a window of the picture [pixels], its light multiplied by a gain."""
     if not (window.rows and window.columns):
         return _NOTHING
     dense = Pinhole(camera.focal * DENSITY, _dense(camera.centre), camera.pose)
     left, top = np.floor(_dense((window.left, window.top))).astype(int)
     right, bottom = np.ceil(_dense((window.left + window.columns, window.top + window.rows))).astype(int)
-    cut = Window(int(top), int(left), int(bottom - top), int(right - left))
+    cut = PictureWindow(int(top), int(left), int(bottom - top), int(right - left))
     sprite = renderer.render(surface, pose, dense, lighting, cut, 1)
     light, cover = (
         np.asarray(cv2.sepFilter2D(plane, -1, _FILTER, _FILTER), np.float32)
@@ -101,17 +105,17 @@ def render_key(
     brightest = max(float(light.max()), 1e-30)
     tints = _tints(light, np.float32(brightest), cover)
     lens = intrinsic(dense.focal, (dense.centre[0] - left, dense.centre[1] - top))
-    return Key(tints, brightest * gain, _filled(sprite), points, texels, lens)
+    return BodyKey(tints, brightest * gain, _filled(sprite), points, texels, lens)
 
 
-_NOTHING = Key(
+_NOTHING = BodyKey(
     np.zeros((0, 0), np.uint32), 1.0, np.zeros((0, 0), np.float32), np.zeros((0, 3)), np.zeros((0, 2)), np.eye(3)
 )
 """Of a body that is out of sight."""
 
 
 @njit(nogil=True, cache=True, error_model="numpy")
-def _tints(light: Array, brightest: np.float32, cover: Array) -> NDArray[np.uint32]:
+def _tints(light: Pictures, brightest: np.float32, cover: Pictures) -> NDArray[np.uint32]:
     """Light as a share of the brightest, and coverage, both in 0..1, in 16 bits each."""
     tints = np.empty(light.shape, np.uint32)
     full, half = np.float32(65535), np.float32(0.5)
@@ -123,18 +127,18 @@ def _tints(light: Array, brightest: np.float32, cover: Array) -> NDArray[np.uint
     return tints
 
 
-def _filled(sprite: Sprite) -> Array:
+def _filled(sprite: Sprite) -> Pictures:
     """Depth, and beside the body that of the texel nearest to there; 0 where nothing is seen at all."""
     nothing = np.logical_not((sprite.coverage > 0) & np.isfinite(sprite.depth)).astype(np.uint8)
     if nothing.all():
         return np.zeros_like(sprite.depth)
     _, nearest = cv2.distanceTransformWithLabels(nothing, cv2.DIST_L2, 3, labelType=cv2.DIST_LABEL_PIXEL)
-    filled: Array = _depth_of(np.asarray(nearest, np.int32), int(nearest.max()), nothing, sprite.depth)
+    filled: Pictures = _depth_of(np.asarray(nearest, np.int32), int(nearest.max()), nothing, sprite.depth)
     return filled
 
 
 @njit(nogil=True, cache=True)
-def _depth_of(nearest: NDArray[np.int32], labels: int, nothing: NDArray[np.uint8], depth: Array) -> Array:
+def _depth_of(nearest: NDArray[np.int32], labels: int, nothing: NDArray[np.uint8], depth: Pictures) -> Pictures:
     """Of each texel the depth of the one that is not nothing and has the same label."""
     of_label, filled = np.zeros(labels + 1, np.float32), np.empty(depth.shape, np.float32)
     for row in range(len(nearest)):
@@ -151,7 +155,7 @@ def _dense(xy: tuple[float, float]) -> tuple[float, float]:
     return xy[0] * DENSITY + (DENSITY - 1) / 2, xy[1] * DENSITY + (DENSITY - 1) / 2
 
 
-def _sampled(coverage: Array) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+def _sampled(coverage: Pictures) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
     """(rows, columns) of texels that are covered: a grid of about SAMPLES a side, and the ends of its rows and columns,
     as it is at the outline that a polynomial goes wrong first."""
     solid = coverage >= min(0.99, max(float(coverage.max(initial=0)), 1e-6))
@@ -283,17 +287,17 @@ class Carried:
     z (a x + b y + c) + d, and a matrix (3, 4) from a pixel (x, y) of depth z, as (z x, z y, z, 1), to its texel, and
     how far the polynomial is off at most, of the points that the key shows [texels]."""
 
-    key: Key
-    reference: Array
-    coefficients: Array
-    rigid: Array
+    key: BodyKey
+    reference: Pictures
+    coefficients: Pictures
+    rigid: Pictures
 
     def at(self, instants: slice) -> Carried:
         """At some of the instants."""
         return Carried(self.key, self.reference[instants], self.coefficients[instants], self.rigid[instants])
 
 
-def carry(key: Key, view: Floats, key_view: Floats, focal: float, centre: Floats) -> Carried:
+def carry(key: BodyKey, view: Floats, key_view: Floats, focal: float, centre: Floats) -> Carried:
     """The key seen under maps from body to camera (n, 4, 4), with the picture's centre at `centre` (n, 2)."""
     pixels, _ = project(view, key.points, focal, (0.0, 0.0))
     pixels += centre[:, None]
@@ -308,7 +312,7 @@ _FLIP = np.diag([1.0, -1.0, -1.0, 1.0])
 """A camera that looks along -z with y up, to one that looks along z with y down."""
 
 
-def _rigid(key: Key, view: Floats, key_view: Floats, focal: float, centre: Floats) -> Floats:
+def _rigid(key: BodyKey, view: Floats, key_view: Floats, focal: float, centre: Floats) -> Floats:
     """See `Carried`."""
     now = _FLIP @ view @ np.linalg.inv(key_view) @ _FLIP
     back = np.linalg.inv(now)
@@ -320,12 +324,12 @@ def _rigid(key: Key, view: Floats, key_view: Floats, focal: float, centre: Float
 
 
 def lay(
-    pictures: Array,
-    depths: Array,
+    pictures: Pictures,
+    depths: Pictures,
     boxes: NDArray[np.int64],
     before: Carried,
     after: Carried,
-    share: Array,
+    share: Pictures,
     solid: bool,
     tested: bool,
     marked: bool,
@@ -362,15 +366,15 @@ def lay(
 
 @njit(nogil=True, cache=True, error_model="numpy", fastmath=True)
 def _add(
-    layer: Array,
+    layer: Pictures,
     box: NDArray[np.int64],
     weight: np.float32,
     tints: NDArray[np.uint32],
     brightest: np.float32,
-    depth: Array,
-    reference: Array,
-    coefficients: Array,
-    rigid: Array,
+    depth: Pictures,
+    reference: Pictures,
+    coefficients: Pictures,
+    rigid: Pictures,
     solid: bool,
     deep: bool,
 ) -> None:
@@ -478,22 +482,22 @@ def _empty(cells: NDArray[np.uint32], at: np.uint32, under: np.uint32) -> bool:
 
 @njit(nogil=True, cache=True, error_model="numpy")
 def _lay(
-    pictures: Array,
-    depths: Array,
+    pictures: Pictures,
+    depths: Pictures,
     boxes: NDArray[np.int64],
     tints0: NDArray[np.uint32],
-    depth0: Array,
+    depth0: Pictures,
     brightest0: np.float32,
-    reference0: Array,
-    coefficients0: Array,
-    rigid0: Array,
+    reference0: Pictures,
+    coefficients0: Pictures,
+    rigid0: Pictures,
     tints1: NDArray[np.uint32],
-    depth1: Array,
+    depth1: Pictures,
     brightest1: np.float32,
-    reference1: Array,
-    coefficients1: Array,
-    rigid1: Array,
-    share: Array,
+    reference1: Pictures,
+    coefficients1: Pictures,
+    rigid1: Pictures,
+    share: Pictures,
     solid: bool,
     tested: bool,
     marked: bool,
@@ -555,7 +559,9 @@ def _lay(
 
 
 @njit(nogil=True, cache=True)
-def _resting(boxes: NDArray[np.int64], reference: Array, coefficients: Array, share: Array) -> NDArray[np.bool_]:
+def _resting(
+    boxes: NDArray[np.int64], reference: Pictures, coefficients: Pictures, share: Pictures
+) -> NDArray[np.bool_]:
     """Whether a body is seen just as at the instant before: its rows need not be read again."""
     resting = np.zeros(len(boxes), np.bool_)
     for n in range(1, len(boxes)):

@@ -15,11 +15,12 @@ from numpy.typing import NDArray
 from PIL import Image
 
 from scenes.pictures import check_size
-from scenes.transfer import Array, grey, linear_from_srgb
+from scenes.transfer import grey, linear_from_srgb
 from scenes.unshown import NO_COORDINATES, TRANSPARENCY
 from scenes.wavefront import PLACE, unread_of
 from scenes.wrapping import CLAMP, unrolled
 from spikecam_env.errors import InputError
+from spikecam_env.types import Pictures
 
 UNSTATED_ALBEDO = 0.7
 """Of a mesh that says nothing: light grey paint."""
@@ -27,7 +28,7 @@ UNSTATED_DIFFUSE = (102, 102, 102, 255)
 """That trimesh gives to a material without one."""
 
 
-def own_albedo(mesh: trimesh.Trimesh, without: Callable[[str], None]) -> tuple[trimesh.Trimesh, float | Array]:
+def own_albedo(mesh: trimesh.Trimesh, without: Callable[[str], None]) -> tuple[trimesh.Trimesh, float | Pictures]:
     """A mesh as trimesh read it, and its albedo: one value, one for each vertex (V,), or a texture (h, w).
 
     Faces of several colours get corners of their own.
@@ -60,7 +61,7 @@ def own_albedo(mesh: trimesh.Trimesh, without: Callable[[str], None]) -> tuple[t
     return mesh, UNSTATED_ALBEDO if factor is None else float(grey(factor[None, None])[0, 0])
 
 
-def colour_of(values: Any) -> Array:
+def colour_of(values: Any) -> Pictures:
     """A factor as (3,) linear red, green, blue.
 
     Args:
@@ -77,7 +78,7 @@ def colour_of(values: Any) -> Array:
     return rgb
 
 
-def pixels_of(image: Image.Image) -> tuple[Array, Array]:
+def pixels_of(image: Image.Image) -> tuple[Pictures, Pictures]:
     """Colours (h, w, 3), encoded as they are stored, and alpha (h, w) of an open picture, both in 0..1.
 
     Raises:
@@ -93,7 +94,7 @@ def pixels_of(image: Image.Image) -> tuple[Array, Array]:
 
 def _coloured(
     mesh: trimesh.Trimesh, colours: NDArray[Any], kind: str, without: Callable[[str], None]
-) -> tuple[trimesh.Trimesh, Array]:
+) -> tuple[trimesh.Trimesh, Pictures]:
     """The mesh and the albedo of its vertices; colours (V or F, 3 or 4) uint8."""
     if len(colours) != (len(mesh.vertices) if kind == "vertex" else len(mesh.faces)):
         raise InputError(f"the mesh has {len(colours)} colours of {kind}s; it needs one for each")
@@ -127,7 +128,7 @@ def _apart(mesh: trimesh.Trimesh) -> trimesh.Trimesh:
     )
 
 
-def _factor(material: Any) -> Array | None:
+def _factor(material: Any) -> Pictures | None:
     """(3,) linear red, green, blue in 0..1; None where the material does not state it."""
     stated = getattr(material, "baseColorFactor", None)
     if stated is None and "kd" in getattr(material, "kwargs", {}):
@@ -140,7 +141,7 @@ def _factor(material: Any) -> Array | None:
     return colour_of(stated)
 
 
-def _laid_out(mesh: trimesh.Trimesh, light: Array, place: list[str] | None) -> Array:
+def _laid_out(mesh: trimesh.Trimesh, light: Pictures, place: list[str] | None) -> Pictures:
     """A picture (h, w), and the coordinates of the mesh changed, as MTL's options have it."""
     if place is None:
         return light
@@ -153,7 +154,7 @@ def _laid_out(mesh: trimesh.Trimesh, light: Array, place: list[str] | None) -> A
     return light
 
 
-def _picture(material: Any) -> Array | None:
+def _picture(material: Any) -> Pictures | None:
     """(h, w, 3) sRGB in 0..1, where the material has one."""
     image = getattr(material, "image", None) or getattr(material, "baseColorTexture", None)
     return None if image is None else pixels_of(image)[0]

@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image, UnidentifiedImageError
 
-from scenes.frames import ALONE, Stored, stated_primaries, stated_transfer, stored
+from scenes.frames import ALONE, StoredPicture, stated_primaries, stated_transfer, stored
 from spikecam_env.errors import InputError
 from spikecam_env.untrusted import existing_file, read_table
 
@@ -38,7 +38,7 @@ SRGB_GAMMA = 2.2
 """A PNG that states this power, within 2 %, is an sRGB one.  Source: the PNG specification, table of sRGB's gAMA."""
 
 
-def read_picture(path: str | PathLike[str]) -> Stored:
+def read_picture(path: str | PathLike[str]) -> StoredPicture:
     """A picture file, upright.
 
     Errors: InputError where there is none, it is damaged, not a picture, larger than MOST_PICTURE_PIXELS, holds several
@@ -110,7 +110,7 @@ def pictures_timed(listing: Path) -> tuple[list[Path], NDArray[np.float64]]:
     return files, np.array(times)
 
 
-def _by_pillow(image: Any, source: Path) -> Stored:
+def _by_pillow(image: Any, source: Path) -> StoredPicture:
     check_size(image.width, image.height, source)
     if getattr(image, "n_frames", 1) > 1 and image.format != "MPO":
         raise InputError(f"{source} holds {getattr(image, 'n_frames', 0)} pictures; give a file of one")
@@ -123,7 +123,7 @@ def _by_pillow(image: Any, source: Path) -> Stored:
         values, bits, transfer = whole.values, whole.bits, whole.transfer or transfer
     else:
         values, bits = _values(image, source)
-    return Stored(_upright(values, turn), "linear" if bits == 32 else transfer, primaries, bits)
+    return StoredPicture(_upright(values, turn), "linear" if bits == 32 else transfer, primaries, bits)
 
 
 def _values(image: Image.Image, source: Path) -> tuple[NDArray[np.float32], int]:
@@ -143,7 +143,7 @@ def _values(image: Image.Image, source: Path) -> tuple[NDArray[np.float32], int]
     return np.asarray(image, np.float32) / np.float32(255), 8
 
 
-def _by_ffmpeg(source: Path) -> Stored:
+def _by_ffmpeg(source: Path) -> StoredPicture:
     """A picture as it lies in the file; its orientation is not looked at."""
     import av  # half a second, for those alone who have such pictures
 

@@ -16,11 +16,10 @@ import re
 from collections.abc import Callable
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from spikecam_env.errors import InputError, unknown_name
-
-Array = NDArray[np.float32]
+from spikecam_env.types import Pictures
 
 CHANNELS = ("luminance", "red", "green", "blue")
 
@@ -35,7 +34,7 @@ LUMINANCE: dict[str, tuple[float, float, float]] = {
 CIE XYZ; ITU-R BT.709, BT.470, SMPTE 170M, SMPTE EG 432-1 (P3, D65), ITU-R BT.2020."""
 
 
-def linear_from_srgb(encoded: ArrayLike) -> Array:
+def linear_from_srgb(encoded: ArrayLike) -> Pictures:
     """sRGB values in [0, 1] to linear light (IEC 61966-2-1).
 
     >>> [round(float(light), 3) for light in linear([0.0, 0.5, 1.0])]
@@ -45,11 +44,11 @@ def linear_from_srgb(encoded: ArrayLike) -> Array:
     return np.where(code <= 0.04045, code / 12.92, ((code + 0.055) / 1.055) ** 2.4).astype(np.float32)
 
 
-def _from_bt709(value: Array) -> Array:
+def _from_bt709(value: Pictures) -> Pictures:
     return np.where(value < 0.081, value / 4.5, ((value + 0.099) / 1.099) ** (1 / 0.45)).astype(np.float32)
 
 
-def _from_pq(value: Array) -> Array:
+def _from_pq(value: Pictures) -> Pictures:
     """Constants: SMPTE ST 2084.  In float64: it takes a small difference to the power 6.3."""
     m1, m2 = 2610 / 16384, 128 * 2523 / 4096
     c1, c2, c3 = 3424 / 4096, 32 * 2413 / 4096, 32 * 2392 / 4096
@@ -57,13 +56,13 @@ def _from_pq(value: Array) -> Array:
     return ((np.maximum(root - c1, 0) / (c2 - c3 * root)) ** (1 / m1)).astype(np.float32)
 
 
-def _from_hlg(value: Array) -> Array:
+def _from_hlg(value: Pictures) -> Pictures:
     """Constants: ITU-R BT.2100-2, table 5."""
     a, b, c = 0.17883277, 0.28466892, 0.55991073
     return np.where(value <= 0.5, value**2 / 3, (np.exp((value - c) / a) + b) / 12).astype(np.float32)
 
 
-TRANSFERS: dict[str, Callable[[Array], Array]] = {
+TRANSFERS: dict[str, Callable[[Pictures], Pictures]] = {
     "srgb": linear_from_srgb,
     "bt709": _from_bt709,
     "pq": _from_pq,
@@ -72,7 +71,7 @@ TRANSFERS: dict[str, Callable[[Array], Array]] = {
 }
 
 
-def curve(transfer: str) -> Callable[[Array], Array]:
+def curve(transfer: str) -> Callable[[Pictures], Pictures]:
     """The function of a transfer, float32 in [0, 1] to linear light.  Errors: InputError for an unknown name."""
     if transfer in TRANSFERS:
         return TRANSFERS[transfer]
@@ -83,7 +82,7 @@ def curve(transfer: str) -> Callable[[Array], Array]:
     return lambda value: np.asarray(value**gamma, np.float32)
 
 
-def light_of(values: Array, transfer: str, where: str) -> Array:
+def light_of(values: Pictures, transfer: str, where: str) -> Pictures:
     """Linear light of stored values; those of `linear` may lie above 1.
 
     Errors: InputError, which begins with `where`, for values that are negative, not finite, or above 1 where the
@@ -99,7 +98,7 @@ def light_of(values: Array, transfer: str, where: str) -> Array:
     return curve(transfer)(values)
 
 
-def grey(light: Array, channel: str = "luminance", primaries: str = "bt709") -> Array:
+def grey(light: Pictures, channel: str = "luminance", primaries: str = "bt709") -> Pictures:
     """(h, w) of linear light (h, w) or (h, w, 3: red, green, blue): luminance, or one channel.
 
     Errors: InputError for an unknown channel, and for a channel of a picture without colour.

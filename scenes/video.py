@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from scenes.exposure import checked_interval
-from scenes.film import Film, Reading, fitted, given_times, read_array, read_film
+from scenes.film import Film, FilmOptions, fitted, given_times, read_array, read_film
 from scenes.keys import LONGEST_INTERVAL, interval_for, paint_keys
 from scenes.protocol import Gaze, Truth
 from scenes.transfer import CHANNELS, curve, grey, light_of
@@ -83,7 +83,7 @@ class VideoScene:
             raise InputError("give one of film_rate_hz, times_s and slow; each says by itself when pictures were taken")
         times = None if times_s is None else np.asarray(times_s, np.float64)
         code = _transfer(transfer, gamma)
-        how = Reading(shape, code, channel, film_rate_hz, times, slow, most_pictures, seconds)
+        how = FilmOptions(shape, code, channel, film_rate_hz, times, slow, most_pictures, seconds)
         with np.errstate(all="ignore"):  # a film too long or too short for any number is refused below
             taken = _film(film, how)
             end_s = [taken.time_s[-1] + taken.last_s] if interpolation == "hold" else []
@@ -261,7 +261,7 @@ def _check_choices(
         raise unknown_name("channel", channel, CHANNELS)
 
 
-def _film(film: str | PathLike[str] | NDArray[np.generic], how: Reading) -> Film:
+def _film(film: str | PathLike[str] | NDArray[np.generic], how: FilmOptions) -> Film:
     if not isinstance(film, (str, PathLike)):
         return _from_array(film, how)
     return _from_array(read_array(film), how) if Path(film).suffix.lower() == ".npy" else read_film(film, how)
@@ -278,7 +278,7 @@ def _transfer(transfer: str | None, gamma: float | None) -> str | None:
     return transfer
 
 
-def _from_array(film: NDArray[np.generic], how: Reading) -> Film:
+def _from_array(film: NDArray[np.generic], how: FilmOptions) -> Film:
     if isinstance(film, np.ma.MaskedArray):
         raise InputError("the film is a masked array; fill it first, every pixel has light")
     film = np.asarray(film)

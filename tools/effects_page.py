@@ -157,7 +157,7 @@ from spikecam_env.sensor.effects.base import (
     Acts,
     Charge,
     Effect,
-    Exposure,
+    ExposureBlock,
     Stage,
     parameter,
 )
@@ -179,7 +179,7 @@ class SlowShutter(Effect):
     )
 
     def collect(
-        self, light: Charge, dark: Charge, now: Exposure, memory: Any
+        self, light: Charge, dark: Charge, now: ExposureBlock, memory: Any
     ) -> tuple[Charge, Charge, Any]:
         tau = 1e-6 * self.tau_us * now.frame_rate_hz
         opened = 1.0 - mean_decay(now.start, tau) if tau else 1.0

@@ -14,7 +14,6 @@ from pathlib import Path
 
 import numpy as np
 import tyro
-from numpy.typing import NDArray
 from scipy import optimize, special
 
 from spikecam_env.calibration.flat_maps import LUX, counted, spread_counts
@@ -28,9 +27,8 @@ from spikecam_env.calibration.real import (
 from spikecam_env.calibration.two_levels import split_shading
 from spikecam_env.calibration.wall_noise import OCTAVES, WallNoise, fit_wall_noise
 from spikecam_env.sensor import Circuit, SensorModel
+from spikecam_env.types import Floats
 from spikecam_env.whole import whole_file
-
-Array = NDArray[np.float64]
 
 PRESET = Path(str(resources.files("spikecam_env.sensor"))) / "presets" / "measured.toml"
 
@@ -93,7 +91,7 @@ def fit_measured(folder: str | Path, circuit: Circuit | None = None, *, progress
     )
 
 
-def fit_bowl(smooth: Array) -> Bowl:
+def fit_bowl(smooth: Floats) -> Bowl:
     """Least squares over a map (H, W): a - b r^2 about a free centre is linear in 1, x, y and x^2 + y^2."""
     rows, columns = smooth.shape
     y, x = (axis.ravel().astype(np.float64) for axis in np.mgrid[:rows, :columns])
@@ -111,7 +109,7 @@ def fit_bowl(smooth: Array) -> Bowl:
     )
 
 
-def log_normal_through_quantiles(dark: Array) -> tuple[float, float]:
+def log_normal_through_quantiles(dark: Floats) -> tuple[float, float]:
     """Median and sigma of the log-normal whose counts come nearest to QUANTILES of `dark` (counts over FRAMES).
 
     Nearest: by the largest error of their logarithms.  Counts of ten or fewer are coarse: the log-normal is counted
@@ -120,7 +118,7 @@ def log_normal_through_quantiles(dark: Array) -> tuple[float, float]:
     target = np.log(np.quantile(spread_counts(dark), QUANTILES))
     z = special.ndtri((np.arange(dark.size) + 0.5) / dark.size)
 
-    def worst(parameters: Array) -> float:
+    def worst(parameters: Floats) -> float:
         modelled = spread_counts(counted(np.exp(parameters[0] + parameters[1] * z)))
         return float(np.abs(np.log(np.quantile(modelled, QUANTILES)) - target).max())
 
@@ -130,7 +128,7 @@ def log_normal_through_quantiles(dark: Array) -> tuple[float, float]:
     return float(np.exp(best.x[0])), float(best.x[1])
 
 
-def hot_population(dark: Array, median: float, sigma: float) -> tuple[float, float]:
+def hot_population(dark: Floats, median: float, sigma: float) -> tuple[float, float]:
     """Share of pixels in an exponential population on top of the log-normal crowd, and its mean [as dark]."""
     counts = np.array([(dark > level).mean() for level in _HOT_RATES])
     crowd = special.ndtr(-np.log(np.array(_HOT_RATES) / median) / sigma)

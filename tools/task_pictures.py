@@ -23,7 +23,7 @@ from spikecam_env.envs.tasks import Catch, ReadSpin, Saccade, Track
 from spikecam_env.envs.tasks.digits import DIGITS
 from spikecam_env.envs.tasks.env import TaskEnv
 from spikecam_env.envs.tasks.exposure import Lit
-from spikecam_env.envs.tasks.read_spin import RPM, Reading
+from spikecam_env.envs.tasks.read_spin import RPM, ReadSpinEpisode
 from spikecam_env.whole import check_file, whole_file
 
 EPISODE = 3
@@ -104,7 +104,7 @@ def _moment(env: TaskEnv, seen: NDArray[np.uint8]) -> Moment:
     said = [f"{1e3 * frame / course.drive.frame_rate_hz:.1f} ms"]
     if isinstance(episode, Lit):
         said.append(f"iris {10 ** episode.iris.values[1]:.2g} x")
-    if isinstance(episode, Reading) and episode.is_right:
+    if isinstance(episode, ReadSpinEpisode) and episode.is_right:
         said.append(f"a {episode.truth}" if task.answers == len(DIGITS) else f"{RPM[episode.truth]:.0f} rpm")
     if course.end:
         said.append("success")

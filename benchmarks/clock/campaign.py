@@ -19,8 +19,7 @@ from spikecam_env.calibration.spike_times import SpikeTimes, spike_times
 from spikecam_env.compiled import njit
 from spikecam_env.sensor import SensorModel, SpikeSensor
 from spikecam_env.streams import pack_frames
-
-Array = NDArray[np.float64]
+from spikecam_env.types import Floats
 
 NEAR = (-0.01, 0.0, 0.01)
 """Mean intervals of the flats, less n [frames]."""
@@ -66,7 +65,7 @@ def record(model: SensorModel, shape: tuple[int, int], design: Flats, seed: int)
     return counted(np.concatenate(each), np.concatenate(offsets), rows, design.interval)
 
 
-def counted(each: Array, offset: Array, row: NDArray[np.int64], interval: int) -> Steps:
+def counted(each: Floats, offset: Floats, row: NDArray[np.int64], interval: int) -> Steps:
     """Cells of pixels by row and offset (P,); each: (P, 3) intervals, a frame longer, a frame shorter."""
     cell = np.round((offset - OFFSETS[0]) / (OFFSETS[1] - OFFSETS[0]))
     known = (cell >= 0) & (cell < OFFSETS.size) & (each[:, 0] > 0)
@@ -92,14 +91,14 @@ def _times(spikes: NDArray[np.uint8]) -> SpikeTimes:
     return spike_times(pack_frames(spikes), spikes.shape[1] * spikes.shape[2], (1,))
 
 
-def _lines(times: list[SpikeTimes], light: Array) -> tuple[Array, Array]:
+def _lines(times: list[SpikeTimes], light: Floats) -> tuple[Floats, Floats]:
     rates: Rates = rates_from_times(times)
     lines = fit_lines(np.broadcast_to(light[:, None], rates.rate.shape), rates, _WHITE)
     return lines.gain, lines.dark
 
 
 @njit(cache=True)
-def spike_steps(spikes: NDArray[np.uint8], interval: int) -> Array:
+def spike_steps(spikes: NDArray[np.uint8], interval: int) -> Floats:
     """(P, 3) intervals of (T, P) spikes, and those of one frame more and one less than `interval`."""
     frames, pixels = spikes.shape
     out = np.zeros((pixels, 3))

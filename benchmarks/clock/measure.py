@@ -21,12 +21,10 @@ from functools import lru_cache
 from itertools import product
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
 from benchmarks.clock.phases import Walk, edge, sampled, walk
-
-Array = NDArray[np.float64]
+from spikecam_env.types import Floats
 
 NODES = 16
 """Phases at which the curve is free; a node every 3 us at 20 kHz, what a spike's noise leaves apart at T = 2."""
@@ -70,13 +68,13 @@ class Steps:
     """
 
     interval: int
-    offsets: Array
-    intervals: Array
-    shifts: Array
-    drift: Array
-    drift_sd: Array
-    drift_at: Array
-    spread: Array
+    offsets: Floats
+    intervals: Floats
+    shifts: Floats
+    drift: Floats
+    drift_sd: Floats
+    drift_at: Floats
+    spread: Floats
 
 
 @dataclass(frozen=True)
@@ -94,10 +92,10 @@ class Measured:
     tau: float
     noise: float
     span: float
-    errors: Array
-    phases: Array
-    curve: Array
-    curve_errors: Array
+    errors: Floats
+    phases: Floats
+    curve: Floats
+    curve_errors: Floats
     left: float
 
 
@@ -118,7 +116,7 @@ def measure(steps: Steps) -> Measured:
     )
 
 
-def row_phase(rows: int, span: float) -> Array:
+def row_phase(rows: int, span: float) -> Floats:
     """(rows,) phase b of the array's clock at which a row's frame begins; span as in `readout_skew`."""
     share = np.arange(rows) / max(rows - 1, 1)
     return -span * (1.0 - share) if span > 0.0 else span * share
@@ -127,19 +125,19 @@ def row_phase(rows: int, span: float) -> Array:
 _NODES = (np.arange(NODES) + 0.5) / NODES
 
 
-def _law(parameters: Array) -> Array:
+def _law(parameters: Floats) -> Floats:
     return sampled(edge, *parameters[:3])
 
 
-def _residual(steps: Steps, disturbance: Array, noise: float, span: float, off: float) -> Array:
+def _residual(steps: Steps, disturbance: Floats, noise: float, span: float, off: float) -> Floats:
     return _left(steps, _walk(steps, disturbance, noise, off))(0.0, span)
 
 
-def _walk(steps: Steps, disturbance: Array, noise: float, off: float) -> Walk:
+def _walk(steps: Steps, disturbance: Floats, noise: float, off: float) -> Walk:
     return walk(disturbance, noise, float(steps.interval), steps.offsets + off)
 
 
-def _left(steps: Steps, foretold: Walk) -> Callable[[Array | float, float], Array]:
+def _left(steps: Steps, foretold: Walk) -> Callable[[Floats | float, float], Floats]:
     """Measured less foretold by a walk whose edge is at 0, in standard errors of counts: a function of the moment at
     which the edge should be, or of several (...,), and of the span.  The drift depends on neither."""
     drift = _over_cells((foretold.up - foretold.down).mean(axis=1))
@@ -147,7 +145,7 @@ def _left(steps: Steps, foretold: Walk) -> Callable[[Array | float, float], Arra
     drift_left = (steps.drift - drift - off_centre) / np.hypot(steps.drift_sd, _UNEVEN)
     rows, cells = steps.intervals.shape[0], np.arange(steps.offsets.size)
 
-    def left(moment: Array | float, span: float) -> Array:
+    def left(moment: Floats | float, span: float) -> Floats:
         moments = np.asarray(moment)
         share = _over_cells(np.add(*foretold.at(cells, row_phase(rows, span)[:, None] - moments[..., None, None])))
         expected = steps.intervals * share
@@ -158,14 +156,14 @@ def _left(steps: Steps, foretold: Walk) -> Callable[[Array | float, float], Arra
     return left
 
 
-def _over_cells(at_centres: Array) -> Array:
+def _over_cells(at_centres: Floats) -> Floats:
     """Means over cells of d, along the last axis, from values at their centres: with the curvature's 24th."""
     mean = at_centres.copy()
     mean[..., 1:-1] += np.diff(at_centres, 2, axis=-1) / 24.0
     return np.asarray(mean)
 
 
-def _scanned(steps: Steps) -> list[Array]:
+def _scanned(steps: Steps) -> list[Floats]:
     """The best places of edge and rows for the _STARTS best pairs of amplitude and tau."""
     found = []
     for amplitude, tau in product(_AMPLITUDES, _TAUS):
@@ -177,7 +175,7 @@ def _scanned(steps: Steps) -> list[Array]:
     return [start for _, start in sorted(found, key=lambda pair: pair[0])[:_STARTS]]
 
 
-def _along(steps: Steps, law: Array) -> list[Array]:
+def _along(steps: Steps, law: Floats) -> list[Floats]:
     """The law, and the _STARTS best of laws of other spans whose edge is at the same rows and decays in as many rows.
 
     These are nearly alike to the rows; the drift tells them apart.  As an edge lies between two rows, each is a
@@ -192,34 +190,34 @@ def _along(steps: Steps, law: Array) -> list[Array]:
         for moment, size in zip(moments, _size(left(moments, trial[4])), strict=True):
             found.append((float(size), trial + moment % 1.0 * np.eye(6)[1]))
     found.sort(key=lambda pair: pair[0])
-    spans: dict[float, Array] = {}
+    spans: dict[float, Floats] = {}
     for _, start in found:
         spans.setdefault(float(start[4]), start)
     inside = [start for start in spans.values() if abs(start[4]) < _HIGHEST[4]]
     return [law, *inside[:_STARTS]]
 
 
-def _best(steps: Steps, starts: list[Array]) -> tuple[Array, Array]:
+def _best(steps: Steps, starts: list[Floats]) -> tuple[Floats, Floats]:
     return min((_fitted(steps, start, "soft_l1") for start in starts), key=lambda fit: float(_size(fit[1])))
 
 
-def _size(left: Array) -> Array:
+def _size(left: Floats) -> Floats:
     """(...,) of what is left (..., N)."""
     return np.asarray(np.sqrt(1.0 + left**2).sum(axis=-1))
 
 
-def _fitted(steps: Steps, start: Array, loss: str) -> tuple[Array, Array]:
+def _fitted(steps: Steps, start: Floats, loss: str) -> tuple[Floats, Floats]:
     """Parameters of the edge and what they leave; a coarse start wants a robust loss, as `least_squares` has them."""
 
     @lru_cache(maxsize=8)  # of a derivative's steps, that of the span needs no other walk
-    def left(amplitude: float, moment: float, tau: float, noise: float, off: float) -> Callable[..., Array]:
+    def left(amplitude: float, moment: float, tau: float, noise: float, off: float) -> Callable[..., Floats]:
         return _left(steps, _walk(steps, sampled(edge, amplitude, moment, tau), noise, off))
 
-    def residual(p: Array) -> Array:
+    def residual(p: Floats) -> Floats:
         amplitude, moment, tau, noise, span, off = p
         return left(amplitude, moment, tau, noise, off)(0.0, span)
 
-    def slopes(p: Array) -> Array:
+    def slopes(p: Floats) -> Floats:
         return _slopes(residual, p, residual(p), _STEPS)
 
     bounds = (_LOWEST, _HIGHEST)
@@ -227,12 +225,12 @@ def _fitted(steps: Steps, start: Array, loss: str) -> tuple[Array, Array]:
     return fit.x, residual(fit.x)
 
 
-def _curve(steps: Steps, law: Array, left: Array, slope: Array) -> tuple[Array, Array]:
+def _curve(steps: Steps, law: Floats, left: Floats, slope: Floats) -> tuple[Floats, Floats]:
     """c at the nodes and its standard errors: one Gauss-Newton step of the edge and of hats beside it, together."""
     base = _law(law)
     phases = np.arange(base.size) / base.size
 
-    def hats(heights: Array) -> Array:
+    def hats(heights: Floats) -> Floats:
         return _residual(steps, base + np.interp(phases, _NODES, heights, period=1.0), *law[3:])
 
     small = np.full(NODES, 2e-4)
@@ -249,11 +247,11 @@ def _curve(steps: Steps, law: Array, left: Array, slope: Array) -> tuple[Array, 
     return curve, np.sqrt(_scatter(steps, left + both @ move) * np.diag(covariance))
 
 
-def _slopes(residual: Callable[[Array], Array], at: Array, left: Array, step: Array) -> Array:
+def _slopes(residual: Callable[[Floats], Floats], at: Floats, left: Floats, step: Floats) -> Floats:
     return np.stack([(residual(at + one) - left) / one.sum() for one in np.diag(step)], axis=1)
 
 
-def _scatter(steps: Steps, left: Array) -> float:
+def _scatter(steps: Steps, left: Floats) -> float:
     """By how much variances exceed those of independent cells: the mean square of the rows' sums, 1 or more."""
     sums = left[: steps.shifts.size].reshape(steps.shifts.shape).sum(axis=1)
     return max(float(np.mean(sums**2)) / steps.offsets.size, 1.0)

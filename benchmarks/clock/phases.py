@@ -31,7 +31,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import ndtr
 
-Array = NDArray[np.float64]
+from spikecam_env.types import Floats
 
 PHASES = 128
 """Cells of the circle for densities: 0.008 frames, half the noise of a spike at an interval of 2 frames."""
@@ -40,10 +40,10 @@ _FINE = 4000
 """Points of a frame at which Psi is tabled."""
 
 
-def edge(phase: Array, amplitude: float, moment: float, tau: float) -> Array:
+def edge(phase: Floats, amplitude: float, moment: float, tau: float) -> Floats:
     """c(v) of one edge a frame: amplitude * exp(-((v - moment) mod 1) / tau) less its mean; tau [frames]."""
     mean = tau * -np.expm1(-1.0 / tau)
-    shape: Array = amplitude * (np.exp(-np.mod(phase - moment, 1.0) / tau) - mean)
+    shape: Floats = amplitude * (np.exp(-np.mod(phase - moment, 1.0) / tau) - mean)
     return shape
 
 
@@ -54,12 +54,12 @@ class Walk:
     time, target: a table of Psi, target at time, over phases from before 0 to beyond 1.
     """
 
-    up: Array
-    down: Array
-    time: Array
-    target: Array
+    up: Floats
+    down: Floats
+    time: Floats
+    target: Floats
 
-    def at(self, offset: NDArray[np.int64], start: Array) -> tuple[Array, Array]:
+    def at(self, offset: NDArray[np.int64], start: Floats) -> tuple[Floats, Floats]:
         """up, down of the d of indices `offset` for rows that begin at b = `start`; shapes broadcast."""
         cell = np.interp(np.mod(start, 1.0), self.time, self.target) * PHASES
         low = np.floor(cell).astype(np.int64)
@@ -69,7 +69,7 @@ class Walk:
         return up, down
 
 
-def walk(disturbance: Array, noise: float, interval: float, offsets: Array) -> Walk:
+def walk(disturbance: Floats, noise: float, interval: float, offsets: Floats) -> Walk:
     """Steps of pixels of intervals interval + offsets (D,) [frames].
 
     disturbance: c(v) [thresholds] at v = i / its size, as `sampled` has it.  noise: s.
@@ -88,27 +88,27 @@ def walk(disturbance: Array, noise: float, interval: float, offsets: Array) -> W
     return Walk(up, down, time, target)
 
 
-def _share_below(deviates: Array) -> Array:
+def _share_below(deviates: Floats) -> Floats:
     """Of a normal law; shares below 1e-19 are 0: of 128 by 128 most are, and the exact ones take long."""
     share, counts = np.zeros_like(deviates), deviates > -9.0
     share[counts] = ndtr(deviates[counts])
     return share
 
 
-def sampled(law: object, *arguments: float) -> Array:
+def sampled(law: object, *arguments: float) -> Floats:
     """c(v) at the phases that `walk` takes."""
-    values: Array = law(np.arange(_FINE) / _FINE, *arguments)  # type: ignore[operator]
+    values: Floats = law(np.arange(_FINE) / _FINE, *arguments)  # type: ignore[operator]
     return values
 
 
-def _psi(disturbance: Array, interval: float) -> tuple[Array, Array]:
+def _psi(disturbance: Floats, interval: float) -> tuple[Floats, Floats]:
     """t and Psi(t), rising, over phases from before 0 to beyond 1."""
     time = np.arange(-disturbance.size, 2 * disturbance.size) / disturbance.size
     target = np.maximum.accumulate(time - interval * np.tile(disturbance, 3))
     return time, target + 1e-12 * np.arange(target.size)
 
 
-def _stationary(mean: Array, sd: float) -> Array:
+def _stationary(mean: Floats, sd: float) -> Floats:
     """(PHASES,) probabilities that do not change under y -> N(mean(y), sd^2), on the circle."""
     centres = (np.arange(PHASES) + 0.5) / PHASES
     apart = centres - mean[:, None]
@@ -119,5 +119,5 @@ def _stationary(mean: Array, sd: float) -> Array:
     equations[-1] = 1.0
     right = np.zeros(PHASES)
     right[-1] = 1.0
-    probability: Array = np.linalg.solve(equations, right)
+    probability: Floats = np.linalg.solve(equations, right)
     return probability

@@ -11,8 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from spikecam_env.compiled import njit
-
-Array = NDArray[np.float64]
+from spikecam_env.types import Floats
 
 POINTS = 1000
 """Of the frame, at which c is tabled; a fall takes one of them, 50 ns at 20 kHz."""
@@ -21,7 +20,7 @@ _SETTLE = 12
 """Spikes before the recording, in which phases gather."""
 
 
-def falling_edge(phase: Array, amplitude: float, moment: float, tau: float, fall: float) -> Array:
+def falling_edge(phase: Floats, amplitude: float, moment: float, tau: float, fall: float) -> Floats:
     """An edge that decays with tau, behind an RC of time constant `fall` [frames]; mean 0, fall 0: `phases.edge`.
 
     amplitude: the step before the RC.  The response is that of a frame after many.
@@ -30,21 +29,21 @@ def falling_edge(phase: Array, amplitude: float, moment: float, tau: float, fall
     decays = np.exp(-since / tau)
     mean = tau * -np.expm1(-1.0 / tau)
     if fall <= 0.0:
-        plain: Array = amplitude * (decays - mean)
+        plain: Floats = amplitude * (decays - mean)
         return plain
     share = np.expm1(-1.0 / tau) / np.expm1(-1.0 / fall)
     mean_fall = share * fall * -np.expm1(-1.0 / fall)
-    shaped: Array = amplitude * tau / (tau - fall) * (decays - share * np.exp(-since / fall) - (mean - mean_fall))
+    shaped: Floats = amplitude * tau / (tau - fall) * (decays - share * np.exp(-since / fall) - (mean - mean_fall))
     return shaped
 
 
-def tabled(law: Array | None) -> Array:
+def tabled(law: Floats | None) -> Floats:
     """The table that `recorded` takes: `law` at i / POINTS, none for no disturbance."""
     return np.zeros(POINTS) if law is None else law
 
 
 def recorded(
-    interval: Array, start: Array, table: Array, white: float, frames: int, rng: np.random.Generator
+    interval: Floats, start: Floats, table: Floats, white: float, frames: int, rng: np.random.Generator
 ) -> NDArray[np.uint8]:
     """(frames, P) spikes of pixels of free intervals (P,) [frames], in rows that begin at phases `start` (P,)."""
     spikes = np.zeros((frames, interval.size), np.uint8)
@@ -53,7 +52,7 @@ def recorded(
 
 
 def counts(
-    interval: Array, start: Array, table: Array, white: float, frames: int, rng: np.random.Generator
+    interval: Floats, start: Floats, table: Floats, white: float, frames: int, rng: np.random.Generator
 ) -> NDArray[np.int64]:
     """(P,) numbers of spikes of the same pixels in `frames` frames."""
     number = np.zeros((1, interval.size), np.int64)
@@ -62,7 +61,7 @@ def counts(
 
 
 @njit(cache=True)
-def _psi(table: Array, interval: float, out: Array) -> None:
+def _psi(table: Floats, interval: float, out: Floats) -> None:
     """Psi at i / POINTS into out (POINTS + 1,); what came before the frame is its own maximum, a frame less."""
     points = table.size
     highest = -1e30
@@ -76,7 +75,7 @@ def _psi(table: Array, interval: float, out: Array) -> None:
 
 
 @njit(cache=True)
-def _theta(psi: Array, y: float) -> float:
+def _theta(psi: Floats, y: float) -> float:
     """The time at which Psi comes to y, linear between its points."""
     points = psi.size - 1
     whole = np.floor(y - psi[0])
@@ -95,9 +94,9 @@ def _theta(psi: Array, y: float) -> float:
 
 @njit(cache=True)
 def _fire(
-    interval: Array,
-    start: Array,
-    table: Array,
+    interval: Floats,
+    start: Floats,
+    table: Floats,
     noise: float,
     frames: int,
     rng: np.random.Generator,

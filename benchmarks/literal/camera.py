@@ -13,13 +13,10 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from benchmarks.literal.electrons import Film, Law, Pixels, expose, expose_coupled
 from spikecam_env.sensor import SensorModel
-
-Array = NDArray[np.float64]
-Bits = NDArray[np.uint8]
+from spikecam_env.types import Floats, Spikes
 
 PARTS = 16
 """Parts of a frame in which a threshold that wanders within frames is held."""
@@ -41,9 +38,9 @@ class Camera:
     model: SensorModel
     frames: int
     shape: tuple[int, int]
-    keys: Array
-    levels: Array
-    picture: Array
+    keys: Floats
+    levels: Floats
+    picture: Floats
     rng: np.random.Generator
     law: dict[str, float] = field(default_factory=dict)
     trap_pA: float = 0.0
@@ -53,7 +50,7 @@ class Camera:
     late_kick: bool = False
     share: float = 0.0
     full: float = 0.0
-    reports: list[Callable[[Bits], Bits]] = field(default_factory=list)
+    reports: list[Callable[[Spikes], Spikes]] = field(default_factory=list)
 
     def __post_init__(self) -> None:
         circuit = self.model.circuit
@@ -75,16 +72,16 @@ class Camera:
     def frames_per_s(self) -> float:
         return self.model.frame_rate_hz
 
-    def normal(self, *shape: int) -> Array:
+    def normal(self, *shape: int) -> Floats:
         return self.rng.standard_normal(shape)
 
-    def add_offset_mV(self, offset: Array) -> None:
+    def add_offset_mV(self, offset: Floats) -> None:
         """Another part of the thresholds' movement, (F * k, H or 1, W or 1)."""
         parts = max(len(offset), len(self.offset_mV))
         both = [np.repeat(a, parts // len(a), axis=0) for a in (self.offset_mV, offset)]
         self.offset_mV = both[0] + both[1]
 
-    def exposed(self) -> Bits:
+    def exposed(self) -> Spikes:
         """Spikes (F, H, W) uint8."""
         electrons = self.law.get("electrons", 1000.0)
         per_pA = electrons / (self.model.circuit.capacitance_fF * self.nominal_V * self.frames_per_s * 1e-3)
@@ -107,7 +104,7 @@ class Camera:
         return spikes
 
 
-def _most(keys: Array, levels: Array, frames: int) -> Array:
+def _most(keys: Floats, levels: Floats, frames: int) -> Floats:
     """(F,) light that no moment of each frame, with a frame to either side, exceeds: the highest key or end."""
     at = np.arange(frames)[:, None] + np.array([-1.0, 2.0])
     ends = np.interp(at, keys, levels).max(axis=1)
@@ -422,7 +419,7 @@ def spurious_spikes(effect: Any, camera: Camera) -> None:
 def afterpulsing(effect: Any, camera: Camera) -> None:
     """Each bit is set again, a delay later, with probability p."""
 
-    def reported(bits: Bits) -> Bits:
+    def reported(bits: Spikes) -> Spikes:
         later = int(effect.delay_frames)
         again = bits[:-later] & (camera.rng.random(bits[:-later].shape) < effect.probability)
         both = bits.copy()

@@ -11,9 +11,8 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from benchmarks.literal.camera import Bits, Camera
+from benchmarks.literal.camera import Camera
 from benchmarks.literal.statistics import (
     A1,
     A4,
@@ -40,15 +39,14 @@ from benchmarks.literal.statistics import (
 )
 from spikecam_env.sensor import Keyframes, SensorModel, SpikeSensor
 from spikecam_env.sensor.effects import CATALOGUE
-
-Array = NDArray[np.float64]
+from spikecam_env.types import Floats, Spikes
 
 FRAME_HZ = 40_000.0
 
 JUMP = 1e-6
 """Time that a jump of light takes [frames]."""
 
-Film = Callable[[int], tuple[Array, Array]]
+Film = Callable[[int], tuple[Floats, Floats]]
 """Keys [frames] and levels of so many frames."""
 
 
@@ -68,7 +66,7 @@ class Case:
     groups: int = 48
     frames: int = 300
     separate: bool = False
-    picture: Array = field(default_factory=lambda: np.ones((1, 1)))
+    picture: Floats = field(default_factory=lambda: np.ones((1, 1)))
     quick: bool = False
 
     @property
@@ -89,7 +87,7 @@ class Case:
         rows, columns = self.shape
         return (self.groups, self.shape) if self.separate else (1, (rows, columns * self.groups))
 
-    def literal(self, seed: int) -> list[Bits]:
+    def literal(self, seed: int) -> list[Spikes]:
         """Spikes (F, H, W) of every group, electron by electron."""
         cameras, shape = self.cameras
         keys, levels = self.film(self.frames)
@@ -111,7 +109,7 @@ class Case:
         light = Keyframes(keys, np.ascontiguousarray(radiance))
         SpikeSensor(self.model, self.shape, engine="fast", threads=1).step(light, self.frames)
 
-    def engine(self, name: str, seed: int) -> list[Bits]:
+    def engine(self, name: str, seed: int) -> list[Spikes]:
         """The same by one of the sensor's engines."""
         cameras, shape = self.cameras
         keys, levels = self.film(self.frames)
@@ -122,11 +120,11 @@ class Case:
             [SpikeSensor(self.model, shape, int(s), engine=name, threads=1).step(light, self.frames) for s in seeds]
         )
 
-    def _picture(self, shape: tuple[int, int]) -> Array:
+    def _picture(self, shape: tuple[int, int]) -> Floats:
         picture = np.broadcast_to(self.picture, self.shape)
         return np.tile(picture, (1, shape[1] // self.shape[1]))
 
-    def _grouped(self, cameras: list[Bits]) -> list[Bits]:
+    def _grouped(self, cameras: list[Spikes]) -> list[Spikes]:
         return cameras if self.separate else np.split(cameras[0], self.groups, axis=2)
 
 
@@ -140,7 +138,7 @@ def steady(level: float) -> Film:
 def repeated(period: float, at: list[float], levels: list[float]) -> Film:
     """These keys in every period."""
 
-    def film(frames: int) -> tuple[Array, Array]:
+    def film(frames: int) -> tuple[Floats, Floats]:
         starts = period * np.arange(-2, int(frames / period) + 3)
         return (starts[:, None] + np.array(at)).ravel(), np.tile(levels, starts.size)
 
@@ -167,7 +165,7 @@ SWING = repeated(48.0, [0.0, 7.3, 19.85, 30.4], [0.1, 0.55, 0.3, 0.75])
 """Slow light with keys between frames."""
 
 
-def spot(rows: int, columns: int, low: float, high: float) -> Array:
+def spot(rows: int, columns: int, low: float, high: float) -> Floats:
     picture = np.full((rows, columns), low)
     picture[rows // 2, columns // 2] = high
     return picture

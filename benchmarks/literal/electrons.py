@@ -18,12 +18,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from spikecam_env.compiled import njit
+from spikecam_env.types import Floats, Spikes
 
 _TAU = 2.0 * np.pi
 
 
-Array = NDArray[np.float64]
-Bits = NDArray[np.uint8]
 Places = NDArray[np.int64]
 
 
@@ -206,7 +205,7 @@ def reset(
 
 
 @njit(cache=True, error_model="numpy")
-def report(t: float, n: int, r: int, c: int, edges: Array, spikes: Bits) -> None:
+def report(t: float, n: int, r: int, c: int, edges: Floats, spikes: Spikes) -> None:
     """A spike at t sets the bit of the frame that is read next."""
     while n < spikes.shape[0] and edges[n + 1, r] <= t:
         n += 1
@@ -227,9 +226,9 @@ def live(
     pixels: Pixels,
     film: Film,
     nodes: Nodes,
-    edges: Array,
+    edges: Floats,
     rng: np.random.Generator,
-    spikes: Bits,
+    spikes: Spikes,
 ) -> None:
     """One pixel from `start` to `end`, in its frame n, with thresholds times `scale` plus `offset`.
 
@@ -318,7 +317,7 @@ def start(law: Law, pixels: Pixels, film: Film, first: float, rng: np.random.Gen
 
 @njit(cache=True, error_model="numpy")
 def expose(
-    law: Law, pixels: Pixels, film: Film, edges: Array, offset: Array, rng: np.random.Generator, spikes: Bits
+    law: Law, pixels: Pixels, film: Film, edges: Floats, offset: Floats, rng: np.random.Generator, spikes: Spikes
 ) -> None:
     """spikes (F, H, W) uint8, zeros, are set.
 
@@ -352,7 +351,7 @@ def expose_coupled(
     share: float,
     full: float,
     rng: np.random.Generator,
-    spikes: Bits,
+    spikes: Spikes,
 ) -> None:
     """spikes (F, H, W) uint8, zeros, are set; electrons of the whole array in the order of time.
 
@@ -406,11 +405,11 @@ def _fire(
     late_kick: bool,
     nodes: Nodes,
     pixels: Pixels,
-    due: Array,
+    due: Floats,
     crossed: Places,
     down: Places,
     right: Places,
-    spikes: Bits,
+    spikes: Spikes,
     rng: np.random.Generator,
 ) -> None:
     """Reset (r, c) if an electron took it to its threshold, and all whom that kicks over theirs, which keep nothing."""

@@ -12,8 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import stats
 
-Bits = NDArray[np.uint8]
-Array = NDArray[np.float64]
+from spikecam_env.types import Floats, Spikes
 
 LIMIT = 4.2
 """|z| beyond it is a difference.  Of independent comparisons of what is the same, one in 37 000 is beyond."""
@@ -25,7 +24,7 @@ class Statistic:
     to, None for the number itself."""
 
     name: str
-    of: Callable[[Bits], Array | float]
+    of: Callable[[Spikes], Floats | float]
     scale: float | None = None
 
 
@@ -43,7 +42,7 @@ class Comparison:
         return abs(self.z) <= LIMIT
 
 
-def compared(statistic: Statistic, literal: list[Bits], engine: list[Bits]) -> Comparison:
+def compared(statistic: Statistic, literal: list[Spikes], engine: list[Spikes]) -> Comparison:
     """Two sets of groups by one statistic."""
     a, b = (np.array([statistic.of(group) for group in groups], np.float64) for groups in (literal, engine))
     if a.ndim > 1:
@@ -55,7 +54,7 @@ def compared(statistic: Statistic, literal: list[Bits], engine: list[Bits]) -> C
     return Comparison(float(mean_a), float(mean_b), float(z), float((mean_b - mean_a) / scale) if scale else 0.0)
 
 
-def _histograms(a: Array, b: Array) -> Comparison:
+def _histograms(a: Floats, b: Floats) -> Comparison:
     """Hotelling's T^2 of two sets of histograms (G, n), as the z of the same probability; error: the share of all that
     would have to move to another bin."""
     difference = b.mean(axis=0) - a.mean(axis=0)
@@ -86,36 +85,36 @@ BURN_IN = 12
 """Frames that are left out where a statistic is of the steady state."""
 
 
-def _spikes_in_order(bits: Bits) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+def _spikes_in_order(bits: Spikes) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
     """Pixel and frame of each spike, pixel by pixel."""
     at = np.flatnonzero(bits.reshape(len(bits), -1).T)
     pixel, frame = np.divmod(at, len(bits))
     return pixel, frame
 
 
-def _spans(bits: Bits, k: int) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
+def _spans(bits: Spikes, k: int) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
     """Time from each spike to the k-th after it, and whether that is of the same pixel."""
     pixel, frame = _spikes_in_order(bits[BURN_IN:])
     return frame[k:] - frame[:-k], pixel[k:] == pixel[:-k]
 
 
-def _rate(bits: Bits) -> float:
+def _rate(bits: Spikes) -> float:
     return float(bits[BURN_IN:].mean())
 
 
-def _interval_variance(bits: Bits) -> float:
+def _interval_variance(bits: Spikes) -> float:
     spans, same = _spans(bits, 1)
     return float(np.var(spans[same]))
 
 
-def _serial_correlation(bits: Bits) -> float:
+def _serial_correlation(bits: Spikes) -> float:
     spans, same = _spans(bits, 1)
     d = spans - spans[same].mean()
     return float(np.mean((d[1:] * d[:-1])[same[1:] & same[:-1]]) / np.var(spans[same]))
 
 
-def _second_difference(k: int) -> Callable[[Bits], float]:
-    def of(bits: Bits) -> float:
+def _second_difference(k: int) -> Callable[[Spikes], float]:
+    def of(bits: Spikes) -> float:
         pixel, frame = _spikes_in_order(bits[BURN_IN:])
         second = frame[2 * k :] - 2 * frame[k:-k] + frame[: -2 * k]
         return float(np.mean(np.square(second[pixel[2 * k :] == pixel[: -2 * k]], dtype=np.float64)))
@@ -123,7 +122,7 @@ def _second_difference(k: int) -> Callable[[Bits], float]:
     return of
 
 
-def _interval_histogram(bits: Bits) -> Array:
+def _interval_histogram(bits: Spikes) -> Floats:
     """Shares of intervals 1 .. 7 and of longer ones, about the shortest that is not rare."""
     spans, same = _spans(bits, 1)
     d = spans[same]
@@ -131,19 +130,19 @@ def _interval_histogram(bits: Bits) -> Array:
     return np.bincount(np.clip(d - first, 0, 7), minlength=8) / d.size
 
 
-def _after(frame: int, period: int) -> Callable[[Bits], float]:
+def _after(frame: int, period: int) -> Callable[[Spikes], float]:
     """Spikes of the frame so many after each edge, of light with an edge every `period` frames; frame: absolute."""
 
-    def of(bits: Bits) -> float:
+    def of(bits: Spikes) -> float:
         return float(bits[frame + (frame < BURN_IN) * period :: period].mean())
 
     return of
 
 
-def _coincidence(lag: int) -> Callable[[Bits], float]:
+def _coincidence(lag: int) -> Callable[[Spikes], float]:
     """Of neighbours in rows and columns: E[s_i(t) s_j(t + lag)] / E[s]^2 - 1, both ways."""
 
-    def of(bits: Bits) -> float:
+    def of(bits: Spikes) -> float:
         s = bits[BURN_IN:].astype(np.float32)
         late, soon = s[lag:], s[: len(s) - lag]
         pairs = [
@@ -156,13 +155,13 @@ def _coincidence(lag: int) -> Callable[[Bits], float]:
     return of
 
 
-def _population_variance(bits: Bits) -> float:
+def _population_variance(bits: Spikes) -> float:
     """Variance over frames of the share that fires."""
     return float(np.var(bits[BURN_IN:].mean(axis=(1, 2))))
 
 
-def _population_correlation(lag: int) -> Callable[[Bits], float]:
-    def of(bits: Bits) -> float:
+def _population_correlation(lag: int) -> Callable[[Spikes], float]:
+    def of(bits: Spikes) -> float:
         a = bits[BURN_IN:].mean(axis=(1, 2))
         a = a - a.mean()
         return float(np.mean(a[lag:] * a[:-lag]) / np.mean(a * a))
@@ -170,11 +169,11 @@ def _population_correlation(lag: int) -> Callable[[Bits], float]:
     return of
 
 
-def _line(cycles: float, quadrature: bool) -> Callable[[Bits], float]:
+def _line(cycles: float, quadrature: bool) -> Callable[[Spikes], float]:
     """Amplitude of the population's rate over its mean, in phase with sin 2 pi f t at the frames' middles or with the
     cosine."""
 
-    def of(bits: Bits) -> float:
+    def of(bits: Spikes) -> float:
         a = bits[BURN_IN:].mean(axis=(1, 2))
         phase = 2.0 * np.pi * cycles * (np.arange(a.size) + BURN_IN + 0.5)
         wave = np.cos(phase) if quadrature else np.sin(phase)
@@ -183,34 +182,34 @@ def _line(cycles: float, quadrature: bool) -> Callable[[Bits], float]:
     return of
 
 
-def _slope_over_rows(frame: int, period: int) -> Callable[[Bits], float]:
+def _slope_over_rows(frame: int, period: int) -> Callable[[Spikes], float]:
     """How the response in a frame after each edge changes from the first row to the last."""
 
-    def of(bits: Bits) -> float:
+    def of(bits: Spikes) -> float:
         response = bits[frame + (frame < BURN_IN) * period :: period].mean(axis=(0, 2))
         return float(np.polyfit(np.linspace(0.0, 1.0, response.size), response, 1)[0])
 
     return of
 
 
-def _spread(axes: tuple[int, ...]) -> Callable[[Bits], float]:
+def _spread(axes: tuple[int, ...]) -> Callable[[Spikes], float]:
     """Standard deviation over pixels, rows or columns of their rates, over the rate."""
 
-    def of(bits: Bits) -> float:
+    def of(bits: Spikes) -> float:
         rates = bits[BURN_IN:].mean(axis=axes)
         return float(rates.std() / rates.mean())
 
     return of
 
 
-def _quantile(q: float) -> Callable[[Bits], float]:
+def _quantile(q: float) -> Callable[[Spikes], float]:
     return lambda bits: float(np.quantile(bits[BURN_IN:].mean(axis=0), q))
 
 
-def _window_variance(frames: int) -> Callable[[Bits], float]:
+def _window_variance(frames: int) -> Callable[[Spikes], float]:
     """Variance of a pixel's count in windows of so many frames."""
 
-    def of(bits: Bits) -> float:
+    def of(bits: Spikes) -> float:
         s = bits[BURN_IN:]
         s = s[: len(s) // frames * frames]
         return float(np.var(s.reshape(-1, frames, *s.shape[1:]).sum(axis=1, dtype=np.float64)))
@@ -218,17 +217,17 @@ def _window_variance(frames: int) -> Callable[[Bits], float]:
     return of
 
 
-def _wander(lag: int) -> Callable[[Bits], float]:
+def _wander(lag: int) -> Callable[[Spikes], float]:
     """Mean square change of the population's rate over so many frames, over the rate squared."""
 
-    def of(bits: Bits) -> float:
+    def of(bits: Spikes) -> float:
         a = bits.mean(axis=(1, 2))
         return float(np.mean(np.square(a[lag:] - a[:-lag])) / a.mean() ** 2)
 
     return of
 
 
-def _place(r: int, c: int) -> Callable[[Bits], float]:
+def _place(r: int, c: int) -> Callable[[Spikes], float]:
     return lambda bits: float(bits[BURN_IN:, r, c].mean())
 
 
@@ -272,7 +271,7 @@ def latency(edge: int, period: int) -> tuple[Statistic, ...]:
 def bands(n: int) -> tuple[Statistic, ...]:
     """Interval variance in each of n bands of rows."""
 
-    def in_band(k: int) -> Callable[[Bits], float]:
+    def in_band(k: int) -> Callable[[Spikes], float]:
         return lambda bits: _interval_variance(np.array_split(bits, n, axis=1)[k])
 
     return tuple(Statistic(f"interval variance, band {k + 1} of {n}", in_band(k)) for k in range(n))
@@ -295,5 +294,5 @@ def moments(*frames: int) -> tuple[Statistic, ...]:
     return tuple(Statistic(f"frame {n}", _moment(n)) for n in frames)
 
 
-def _moment(frame: int) -> Callable[[Bits], float]:
+def _moment(frame: int) -> Callable[[Spikes], float]:
     return lambda bits: float(bits[frame].mean())

@@ -11,13 +11,13 @@ from numpy.typing import NDArray
 
 from spikecam_env.errors import InputError
 from spikecam_env.streams import isi_plane, middleTFP
+from spikecam_env.types import Spikes
 
-Spikes = NDArray[np.uint8]
 Planes = NDArray[np.float32]
 
 
 @dataclass(frozen=True)
-class Case:
+class StreamCase:
     """One stream to judge: what it shows, and the settings that it follows from.
 
     kind      "phm", a catalogue scene; "still", a collage that does not move; "real", a recording
@@ -39,7 +39,7 @@ class Case:
 
 
 @dataclass(frozen=True)
-class Exposed:
+class ExposedStreams:
     """A case's streams, (T, H, W) from frame 0 on, and the frames first .. stop that are judged.
 
     clean, light: of the noise-free twin, and true light (stop - first, H, W) in [0, 1] [spikes/frame]; None where they

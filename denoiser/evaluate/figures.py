@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from denoiser.evaluate.judge import COLUMNS, PLANE, Record
+from denoiser.evaluate.judge import COLUMNS, PLANE, RowResult
 from denoiser.evaluate.table_summary import best_picture
 
 Figure = dict[str, Any]
@@ -40,9 +40,9 @@ GAIN_DB, STILL_GAIN_DB = 1.2, 1.5
 """Of the rate planes over those of earlier weights, on PHM_N and at rest."""
 
 
-def figures(table: str, groups: Sequence[Group], records: Sequence[Record]) -> list[Figure]:
+def figures(table: str, groups: Sequence[Group], records: Sequence[RowResult]) -> list[Figure]:
     """The figures that a table can show."""
-    makers: dict[str, list[Callable[[Group, Sequence[Record]], list[Figure]]]] = {
+    makers: dict[str, list[Callable[[Group, Sequence[RowResult]], list[Figure]]]] = {
         "table1": [_never_below],
         "table3": [_ablation],
         "table2": [_naturalness],
@@ -71,7 +71,7 @@ def _score(group: Group, row: str, column: str) -> dict[str, Any]:
     return found
 
 
-def _gains_of_paper(group: Group, _: Sequence[Record]) -> list[Figure]:
+def _gains_of_paper(group: Group, _: Sequence[RowResult]) -> list[Figure]:
     found = []
     for column in LEARNED:
         for row in ("paper-mus", "paper", "best"):
@@ -83,7 +83,7 @@ def _gains_of_paper(group: Group, _: Sequence[Record]) -> list[Figure]:
     return found
 
 
-def _spikes_of_best(group: Group, records: Sequence[Record]) -> list[Figure]:
+def _spikes_of_best(group: Group, records: Sequence[RowResult]) -> list[Figure]:
     found = []
     for column, least in SPIKES_OF_BEST.items():
         gain = _gain(group, "best", column)
@@ -99,7 +99,7 @@ def _spikes_of_best(group: Group, records: Sequence[Record]) -> list[Figure]:
     return found
 
 
-def _spikes_of_paper(group: Group, _: Sequence[Record]) -> list[Figure]:
+def _spikes_of_paper(group: Group, _: Sequence[RowResult]) -> list[Figure]:
     gains = {column: _gain(group, "paper", column) for column in COLUMNS}
     return [
         _figure(f"paper, {COLUMNS[column]}: mean over noisy [dB]", "> 0", gain, None if gain is None else gain > 0)
@@ -107,7 +107,7 @@ def _spikes_of_paper(group: Group, _: Sequence[Record]) -> list[Figure]:
     ]
 
 
-def _planes(group: Group, _: Sequence[Record]) -> list[Figure]:
+def _planes(group: Group, _: Sequence[RowResult]) -> list[Figure]:
     best = group["rows"].get("best", {})
     db, ssim = (best.get("mean_plane", {}).get(name) for name in ("db", "ssim"))
     return [
@@ -133,7 +133,7 @@ def _faithful(best: dict[str, Any]) -> list[Figure]:
 _AT_OWN = (_gains_of_paper, _spikes_of_best, _spikes_of_paper, _planes)
 
 
-def _never_below(group: Group, records: Sequence[Record]) -> list[Figure]:
+def _never_below(group: Group, records: Sequence[RowResult]) -> list[Figure]:
     """`best` under its best picture, against noisy under the picture that is best for noisy."""
     noisy, best = (group["rows"].get(row) for row in ("noisy", "best"))
     theirs, ours = (best_picture(row) if row else None for row in (noisy, best))
@@ -147,7 +147,7 @@ def _never_below(group: Group, records: Sequence[Record]) -> list[Figure]:
     ]  # fmt: skip
 
 
-def _ablation(group: Group, _: Sequence[Record]) -> list[Figure]:
+def _ablation(group: Group, _: Sequence[RowResult]) -> list[Figure]:
     """The paper's two parts, each with and without the other; then what accumulation does in the place of MUS, and both
     decoders on the true light, where no network errs."""
     found = []
@@ -172,7 +172,7 @@ STEPS = (
 """What, row, row it is compared with, the paper's gain [dB] (table 3)."""
 
 
-def _naturalness(group: Group, _: Sequence[Record]) -> list[Figure]:
+def _naturalness(group: Group, _: Sequence[RowResult]) -> list[Figure]:
     """Lower is better."""
     return [
         _niqe_figure(group, f"{row} over noisy", row, "noisy", column, PAPER_NIQE.get(row))
@@ -181,7 +181,7 @@ def _naturalness(group: Group, _: Sequence[Record]) -> list[Figure]:
     ]
 
 
-def _natural_ablation(group: Group, _: Sequence[Record]) -> list[Figure]:
+def _natural_ablation(group: Group, _: Sequence[RowResult]) -> list[Figure]:
     return [
         *(
             _niqe_figure(group, f"MUS over intervals kept, {row}", f"{row}-mus", f"{row}-held", column, paper)
@@ -215,7 +215,7 @@ def _over_before(group: Group, measure: str, wanted: float) -> list[Figure]:
     return [_figure("best, rate planes: over earlier weights [dB]", f">= {wanted}", gain, _least(gain, wanted))]
 
 
-def _at_rest(group: Group, _: Sequence[Record]) -> list[Figure]:
+def _at_rest(group: Group, _: Sequence[RowResult]) -> list[Figure]:
     noisy, best, mapped = (group["rows"].get(row, {}).get("mean_db") for row in ("noisy", "best", "best-map"))
     return [
         _figure("best over noisy, mean of all frames [dB]", "> 0", _less(best, noisy), _least(_less(best, noisy), 0)),
@@ -224,11 +224,11 @@ def _at_rest(group: Group, _: Sequence[Record]) -> list[Figure]:
     ]
 
 
-def _planes_at_rest(group: Group, _: Sequence[Record]) -> list[Figure]:
+def _planes_at_rest(group: Group, _: Sequence[RowResult]) -> list[Figure]:
     return _faithful(group["rows"].get("best", {}))
 
 
-def _worst(records: Sequence[Record], row: str, column: str, column_of_noisy: str | None = None) -> float | None:
+def _worst(records: Sequence[RowResult], row: str, column: str, column_of_noisy: str | None = None) -> float | None:
     """Least mean gain over noisy of any scene, over seeds [dB]."""
     gains: dict[str, list[float]] = {}
     noisy = {(r.scene, r.seed): r.pictures.get(column_of_noisy or column) for r in records if r.row == "noisy"}

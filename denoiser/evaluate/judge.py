@@ -10,9 +10,10 @@ import numpy as np
 from pydantic import Field
 
 from denoiser.evaluate import measures
-from denoiser.evaluate.exposed import Exposed, Planes, Spikes, picture
+from denoiser.evaluate.exposed import ExposedStreams, Planes, picture
 from denoiser.metrics import psnr_db, ssim
 from denoiser.niqe import SMALLEST, niqe
+from spikecam_env.types import Spikes
 from spikecam_env.untrusted import Declared, Name, Seed
 
 COLUMNS = {
@@ -31,7 +32,7 @@ MEAN_EVERY = 5
 """Of the judged rate planes, one in so many goes into their mean score; prime to 8 and 16 planes a pass."""
 
 
-class Score(Declared):
+class PictureScore(Declared):
     """Of a picture: PSNR [dB] and SSIM against the light, or NIQE where no light is known."""
 
     db: float | None = None
@@ -39,7 +40,7 @@ class Score(Declared):
     niqe: float | None = None
 
 
-class Record(Declared):
+class RowResult(Declared):
     """What was found for one row of one case; None where a measure has no value.
 
     weights: SHA-256 of what it was made with, by name of the row's source and of the columns.
@@ -55,8 +56,8 @@ class Record(Declared):
     speed: float
     row: Name
     weights: dict[str, str | None]
-    pictures: dict[str, Score]
-    mean_plane: Score | None = None
+    pictures: dict[str, PictureScore]
+    mean_plane: PictureScore | None = None
     bias: float | None = None
     lag: float | None = None
     db_by_place: list[float | None] = Field(default_factory=list)
@@ -77,7 +78,7 @@ def display(radiance: Planes, white: float) -> np.ndarray:
 
 
 def pictures_of(
-    spikes: Spikes, planes: Planes | None, exposed: Exposed, columns: Mapping[str, Path]
+    spikes: Spikes, planes: Planes | None, exposed: ExposedStreams, columns: Mapping[str, Path]
 ) -> dict[str, Planes]:
     """By column: the row's pictures at the middle frame, and its rate plane there.  columns: file of weights of each,
     which those that need none ignore."""
@@ -87,9 +88,15 @@ def pictures_of(
 
 
 def judged(
-    shown: dict[str, Planes], spikes: Spikes, planes: Planes | None, exposed: Exposed, passes: int, *, still: bool
+    shown: dict[str, Planes],
+    spikes: Spikes,
+    planes: Planes | None,
+    exposed: ExposedStreams,
+    passes: int,
+    *,
+    still: bool,
 ) -> dict[str, Any]:
-    """Entries of a `Record` but for its key and weights."""
+    """Entries of a `RowResult` but for its key and weights."""
     if exposed.light is None:
         return {"pictures": {column: _natural(p, exposed.white) for column, p in shown.items()}}
     truth = exposed.light[exposed.middle - exposed.first]
@@ -109,21 +116,21 @@ def plain(value: float) -> float | None:
     return round(float(value), 5) if np.isfinite(value) else None
 
 
-def _against(shown: Planes, truth: Planes, white: float) -> Score:
-    return Score(db=plain(psnr_db(shown, truth, white)), ssim=plain(ssim(shown, truth, white)))
+def _against(shown: Planes, truth: Planes, white: float) -> PictureScore:
+    return PictureScore(db=plain(psnr_db(shown, truth, white)), ssim=plain(ssim(shown, truth, white)))
 
 
-def _natural(shown: Planes, white: float) -> Score:
-    return Score(niqe=plain(niqe(display(shown, white)))) if min(shown.shape) >= SMALLEST else Score()
+def _natural(shown: Planes, white: float) -> PictureScore:
+    return PictureScore(niqe=plain(niqe(display(shown, white)))) if min(shown.shape) >= SMALLEST else PictureScore()
 
 
-def _of_planes(planes: Planes, exposed: Exposed, passes: int) -> dict[str, Any]:
+def _of_planes(planes: Planes, exposed: ExposedStreams, passes: int) -> dict[str, Any]:
     light, first, white = exposed.light, exposed.first, exposed.white
     assert light is not None
     scores = [_against(p, truth, white) for p, truth in zip(planes[::MEAN_EVERY], light[::MEAN_EVERY], strict=True)]
     middle = exposed.middle - first
     return {
-        "mean_plane": Score(db=_mean([s.db for s in scores]), ssim=_mean([s.ssim for s in scores])),
+        "mean_plane": PictureScore(db=_mean([s.db for s in scores]), ssim=_mean([s.ssim for s in scores])),
         "db_by_place": [plain(db) for db in measures.db_by_place(planes, light, passes, first, white)],
         "flicker": plain(measures.across_over_within(planes, light, passes, first)),
         "texture": plain(measures.texture_slope(planes[middle], light[middle])),

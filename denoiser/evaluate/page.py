@@ -8,8 +8,8 @@ from pathlib import Path
 from matplotlib import font_manager
 from PIL import Image, ImageDraw, ImageFont
 
-from denoiser.evaluate.exposed import Case
-from denoiser.evaluate.judge import COLUMNS, PLANE, Record
+from denoiser.evaluate.exposed import StreamCase
+from denoiser.evaluate.judge import COLUMNS, PLANE, RowResult
 from denoiser.evaluate.rows import ROWS
 from denoiser.evaluate.work import LIGHT, picture_path
 from spikecam_env.whole import whole_file
@@ -23,7 +23,9 @@ COLUMN = "tfp21"
 STRIP = ("noisy", "paper-mus", "paper", "best", "clean")
 
 
-def write_page(path: Path, folder: Path, cases: Sequence[Case], rows: Sequence[str], records: Sequence[Record]) -> None:
+def write_page(
+    path: Path, folder: Path, cases: Sequence[StreamCase], rows: Sequence[str], records: Sequence[RowResult]
+) -> None:
     """Strips of the scenes whose pictures are in `folder`; no page where there are none."""
     first = {case.scene: case for case in reversed(cases)}
     strips = [_strip(folder, first[scene], rows, records) for scene in reversed(first)]
@@ -40,7 +42,7 @@ def write_page(path: Path, folder: Path, cases: Sequence[Case], rows: Sequence[s
         whole.save(beside)
 
 
-def _strip(folder: Path, case: Case, rows: Sequence[str], records: Sequence[Record]) -> Image.Image | None:
+def _strip(folder: Path, case: StreamCase, rows: Sequence[str], records: Sequence[RowResult]) -> Image.Image | None:
     panels = [(row, COLUMN) for row in STRIP if row in rows]
     panels += [(row, PLANE) for row in rows if ROWS[row].shows_planes]
     panels.append((LIGHT, LIGHT))
@@ -60,7 +62,7 @@ def _strip(folder: Path, case: Case, rows: Sequence[str], records: Sequence[Reco
     return strip
 
 
-def _caption(case: Case, row: str, column: str, records: Sequence[Record]) -> tuple[str, str]:
+def _caption(case: StreamCase, row: str, column: str, records: Sequence[RowResult]) -> tuple[str, str]:
     if row == LIGHT:
         return f"{case.scene}: true light", ""
     title = f"{ROWS[row].title}, {'rate plane' if column == PLANE else COLUMNS[column]}"

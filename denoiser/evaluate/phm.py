@@ -13,7 +13,7 @@ from pathlib import Path
 
 import numpy as np
 
-from denoiser.evaluate.exposed import Case, Exposed
+from denoiser.evaluate.exposed import ExposedStreams, StreamCase
 from denoiser.pairs import light_in_frame
 from scenes.catalogue import make_scene
 from scenes.faster import at_speed
@@ -50,7 +50,7 @@ def default_frames(interval: float) -> int:
     return 2 * (WARM_UP + reach(interval))
 
 
-def dataset_cases(folder: str | Path) -> list[Case]:
+def dataset_cases(folder: str | Path) -> list[StreamCase]:
     """The scenes of a dataset that `spikecam dataset phm-n` made.
 
     Raises InputError for a folder that holds none, and for one whose files are not done.
@@ -62,7 +62,7 @@ def dataset_cases(folder: str | Path) -> list[Case]:
         if file["sha256"] is None:
             raise InputError(f"{folder} has no whole {file['path']}; run `spikecam dataset` again to make it")
     return [
-        Case(
+        StreamCase(
             "phm",
             Path(file["path"]).stem,
             file["scene_seed"],
@@ -76,7 +76,7 @@ def dataset_cases(folder: str | Path) -> list[Case]:
 
 
 @lru_cache(maxsize=1)
-def expose(case: Case) -> Exposed:
+def expose(case: StreamCase) -> ExposedStreams:
     """The case's streams and light; the last one is kept."""
     middle = case.frames // 2
     around = min(reach(case.interval), middle)
@@ -85,10 +85,10 @@ def expose(case: Case) -> Exposed:
     scene, noisy, clean = _from_dataset(case, seen) if case.folder else _simulated(case, seen)
     keys = scene.radiance(first, stop)
     light = np.stack([light_in_frame(keys, t) for t in range(first, stop)])
-    return Exposed(noisy, clean, light, first, stop, middle, white=float(light.max()))
+    return ExposedStreams(noisy, clean, light, first, stop, middle, white=float(light.max()))
 
 
-def _simulated(case: Case, frames: int) -> tuple[Scene, np.ndarray, np.ndarray]:
+def _simulated(case: StreamCase, frames: int) -> tuple[Scene, np.ndarray, np.ndarray]:
     plan = phm_n(scenes=(case.scene,), seed=case.seed)
     scene = make_scene(case.scene, case.shape, 0, case.interval, renderer=renderer_of_process(AUTO))
     if case.speed:
@@ -99,7 +99,7 @@ def _simulated(case: Case, frames: int) -> tuple[Scene, np.ndarray, np.ndarray]:
     return scene, camera.step(light, frames), twin.step(light, frames)
 
 
-def _from_dataset(case: Case, frames: int) -> tuple[Scene, np.ndarray, np.ndarray]:
+def _from_dataset(case: StreamCase, frames: int) -> tuple[Scene, np.ndarray, np.ndarray]:
     folder = Path(case.folder)
     manifest = Manifest.read(folder)
     file = next(f for f in manifest.files if Path(f["path"]).stem == case.scene)

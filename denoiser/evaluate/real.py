@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 import spikecam_env
-from denoiser.evaluate.exposed import Case, Exposed
+from denoiser.evaluate.exposed import ExposedStreams, StreamCase
 from denoiser.evaluate.phm import AHEAD, reach
 from spikecam_env.streams import read_recording
 
@@ -22,22 +22,24 @@ WHITE = 99.5
 """Percentile of the mean rate that is shown white."""
 
 
-def real_cases(path: Path) -> list[Case]:
+def real_cases(path: Path) -> list[StreamCase]:
     """A recording as cases, one an instant, whose number is the seed.  Raises InputError where it cannot be read."""
     spikes = _spikes(path)
     interval = round(1 / max(float(spikes.mean()), 1e-6), 1)
     shape = (spikes.shape[1], spikes.shape[2])
-    return [Case("real", path.name, i, shape, len(spikes), interval, folder=str(path.parent)) for i in range(INSTANTS)]
+    return [
+        StreamCase("real", path.name, i, shape, len(spikes), interval, folder=str(path.parent)) for i in range(INSTANTS)
+    ]
 
 
-def expose(case: Case) -> Exposed:
+def expose(case: StreamCase) -> ExposedStreams:
     """The recording; what is judged are the frames about one of its instants, as far as it goes."""
     noisy = _spikes(Path(case.folder) / case.scene)
     middle = (case.seed + 1) * case.frames // (INSTANTS + 1)
     around = min(reach(case.interval), middle, len(noisy) - 1 - middle)
     first, stop = middle - around, middle + around + 1
     white = float(np.percentile(noisy.mean(axis=0), WHITE)) or 1.0
-    return Exposed(noisy[: stop + AHEAD], None, None, first, stop, middle, white)
+    return ExposedStreams(noisy[: stop + AHEAD], None, None, first, stop, middle, white)
 
 
 @lru_cache(maxsize=1)

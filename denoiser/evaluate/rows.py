@@ -24,10 +24,11 @@ import numpy as np
 
 from denoiser import accumulate, mus
 from denoiser.evaluate import held, still
-from denoiser.evaluate.exposed import CLASSICAL, Case, Exposed, Planes, Spikes, film
+from denoiser.evaluate.exposed import CLASSICAL, ExposedStreams, Planes, StreamCase, film
 from denoiser.online import OnlineDnSS
 from denoiser.plain_torch import read_plain
 from spikecam_env.errors import InputError
+from spikecam_env.types import Spikes
 from spikecam_env.untrusted import existing_file
 
 DECODERS: dict[str, Any] = {"held": held, "mus": mus, "accumulate": accumulate}
@@ -144,7 +145,7 @@ def why_not(source: str, weights: Weights) -> str:
 
 
 def streams(
-    source: str, rows: list[str], case: Case, exposed: Exposed, weights: Weights
+    source: str, rows: list[str], case: StreamCase, exposed: ExposedStreams, weights: Weights
 ) -> dict[str, tuple[Spikes, Planes | None]]:
     """By row of the source: (judged frames, H, W) spikes, and the planes they were made of where there are any."""
     if source in ("noisy", "clean"):
@@ -161,7 +162,7 @@ def decoded(planes: Planes, decoder: str) -> Spikes:
     return chosen.step(planes, chosen.start(planes.shape[1:]))[0]  # type: ignore[no-any-return]
 
 
-def denoised(online: OnlineDnSS, exposed: Exposed) -> Planes:
+def denoised(online: OnlineDnSS, exposed: ExposedStreams) -> Planes:
     """Rate planes of the judged frames; no more frames are pushed than they need."""
     planes = np.empty((exposed.stop - exposed.first, *exposed.noisy.shape[1:]), np.float32)
     ready = pushed = 0
@@ -204,27 +205,27 @@ def _online(path: Path, overlap: bool) -> OnlineDnSS:
     return OnlineDnSS.from_file(path, output="rate", overlap=overlap)
 
 
-def _network(name: str, *, overlap: bool = False) -> Callable[[Case, Exposed, Weights], Planes]:
+def _network(name: str, *, overlap: bool = False) -> Callable[[StreamCase, ExposedStreams, Weights], Planes]:
     return lambda case, exposed, weights: denoised(_online(weights.path(name), overlap).another(), exposed)
 
 
-def _calibrated(case: Case, exposed: Exposed, weights: Weights) -> Planes:
+def _calibrated(case: StreamCase, exposed: ExposedStreams, weights: Weights) -> Planes:
     unit = still.calibrated(case)
     return denoised(OnlineDnSS.from_file(weights.path("best"), output="rate", unit=unit), exposed)
 
 
-def _pipeline(name: str) -> Callable[[Case, Exposed, Weights], Planes]:
+def _pipeline(name: str) -> Callable[[StreamCase, ExposedStreams, Weights], Planes]:
     return lambda case, exposed, weights: film(
         name, exposed.noisy, range(exposed.first, exposed.stop), weights.path(name)
     )
 
 
-def _light(case: Case, exposed: Exposed, weights: Weights) -> Planes:
+def _light(case: StreamCase, exposed: ExposedStreams, weights: Weights) -> Planes:
     assert exposed.light is not None
     return np.ascontiguousarray(exposed.light)
 
 
-_SOURCES: dict[str, Callable[[Case, Exposed, Weights], Planes]] = {
+_SOURCES: dict[str, Callable[[StreamCase, ExposedStreams, Weights], Planes]] = {
     **{name: _network(file) for name, file in NETWORKS.items()},
     "best-overlap": _network("best", overlap=True),
     "best-map": _calibrated,

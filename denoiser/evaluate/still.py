@@ -11,7 +11,7 @@ from functools import lru_cache
 
 import numpy as np
 
-from denoiser.evaluate.exposed import Case, Exposed
+from denoiser.evaluate.exposed import ExposedStreams, StreamCase
 from denoiser.evaluate.phm import AHEAD
 from denoiser.evaluate.quick import LIGHTS, held_out_textures
 from denoiser.pairs import light_in_frame
@@ -38,7 +38,7 @@ def still_scenes(a_class: int) -> tuple[str, ...]:
 
 
 @lru_cache(maxsize=1)
-def expose(case: Case) -> Exposed:
+def expose(case: StreamCase) -> ExposedStreams:
     """The case's streams; all frames are judged."""
     name, number = case.scene.rsplit(" ", 1)
     scene = Collage(
@@ -54,7 +54,7 @@ def expose(case: Case) -> Exposed:
     camera = SpikeSensor(SensorModel.preset("scsim"), case.shape, unit_seed(case), engine="auto")
     twin = camera.clean_twin()
     light = light_in_frame(keys, 0)
-    return Exposed(
+    return ExposedStreams(
         camera.step(keys, frames),
         twin.step(keys, frames),
         np.broadcast_to(light, (case.frames, *case.shape)),
@@ -65,12 +65,12 @@ def expose(case: Case) -> Exposed:
     )
 
 
-def unit_seed(case: Case) -> int:
+def unit_seed(case: StreamCase) -> int:
     """Of the camera before a scene: every scene and seed has its own."""
     return int(np.random.default_rng([case.seed, *case.scene.encode()]).integers(2**31))
 
 
-def calibrated(case: Case) -> Calibration:
+def calibrated(case: StreamCase) -> Calibration:
     """SNEE's calibration of the case's camera."""
     with tempfile.TemporaryDirectory() as folder:
         flats = write_flats(

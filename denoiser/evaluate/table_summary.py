@@ -7,17 +7,17 @@ from typing import Any
 
 import numpy as np
 
-from denoiser.evaluate.judge import Record, plain
+from denoiser.evaluate.judge import RowResult, plain
 from denoiser.metrics import gap_closed
 
 Mean = dict[str, float | None]
 
 
-def groups(records: Sequence[Record]) -> list[dict[str, Any]]:
+def groups(records: Sequence[RowResult]) -> list[dict[str, Any]]:
     """Records by mean interval and speed, each with the means of its rows.
 
     A group: interval, speed, scenes, seeds, and rows: row -> {pictures: column -> {db, db_spread, ssim, ssim_spread,
-    niqe, gain_db, gain_ssim, gap_closed}, and the other measures of a `Record`, by name}.
+    niqe, gain_db, gain_ssim, gap_closed}, and the other measures of a `RowResult`, by name}.
     """
     kinds = dict.fromkeys((r.interval, r.speed) for r in records)
     return [_group(*kind, [r for r in records if (r.interval, r.speed) == kind]) for kind in kinds]
@@ -33,7 +33,7 @@ def mean_and_spread(values: Sequence[tuple[int, float | None]]) -> tuple[float |
     return plain(float(np.mean(means))), None if spread is None else plain(spread)
 
 
-def _group(interval: float, speed: float, records: list[Record]) -> dict[str, Any]:
+def _group(interval: float, speed: float, records: list[RowResult]) -> dict[str, Any]:
     rows: dict[str, Any] = {}
     for row in dict.fromkeys(r.row for r in records):
         rows[row] = _row([r for r in records if r.row == row])
@@ -49,7 +49,7 @@ def _group(interval: float, speed: float, records: list[Record]) -> dict[str, An
     }
 
 
-def _row(records: list[Record]) -> dict[str, Any]:
+def _row(records: list[RowResult]) -> dict[str, Any]:
     columns = dict.fromkeys(c for r in records for c in r.pictures)
     return {
         "pictures": {column: _scores([(r.seed, r.pictures[column]) for r in records]) for column in columns},
@@ -69,7 +69,7 @@ def _scores(scores: list[tuple[int, Any]]) -> Mean:
     return found
 
 
-def _by_place(records: list[Record]) -> list[float | None]:
+def _by_place(records: list[RowResult]) -> list[float | None]:
     lists = [(r.seed, r.db_by_place) for r in records if len(r.db_by_place) > 1]
     return [
         mean_and_spread([(s, places[i]) for s, places in lists])[0] for i in range(len(lists[0][1]) if lists else 0)

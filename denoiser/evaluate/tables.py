@@ -23,9 +23,9 @@ from typing import Any
 from tqdm import tqdm
 
 from denoiser.evaluate import phm, real, still
-from denoiser.evaluate.exposed import CLASSICAL, Case
+from denoiser.evaluate.exposed import CLASSICAL, StreamCase
 from denoiser.evaluate.figures import figures
-from denoiser.evaluate.judge import COLUMNS, Record
+from denoiser.evaluate.judge import COLUMNS, RowResult
 from denoiser.evaluate.page import write_page
 from denoiser.evaluate.rows import BEFORE, ROWS, Weights, parameters, why_not
 from denoiser.evaluate.table_report import report
@@ -81,7 +81,7 @@ TABLES = {
 
 
 @dataclass(frozen=True)
-class Asked:
+class TableRequest:
     """What a table is made of; what is not said is the table's own.
 
     scenes: of the catalogue; at rest, how many a class are `still_scenes`.  shape: (rows, columns).  seeds: cameras
@@ -105,7 +105,7 @@ class Asked:
     jobs: int = 1
 
 
-def evaluate_table(name: str, asked: Asked | None = None, *, progress: bool = False) -> dict[str, Any]:
+def evaluate_table(name: str, asked: TableRequest | None = None, *, progress: bool = False) -> dict[str, Any]:
     """A table of `TABLES`; `report` shows the result as text.
 
     Returns table, title, rows, settings, groups (see `table_summary.groups`), scenes (every record), missing (why rows,
@@ -116,7 +116,7 @@ def evaluate_table(name: str, asked: Asked | None = None, *, progress: bool = Fa
     """
     if name not in TABLES:
         raise unknown_name("table", name, TABLES)
-    table, asked = TABLES[name], asked or Asked()
+    table, asked = TABLES[name], asked or TableRequest()
     rows = _rows(table, asked)
     asked.weights.check()
     cases, missing = _cases(table, asked)
@@ -140,7 +140,7 @@ def evaluate_table(name: str, asked: Asked | None = None, *, progress: bool = Fa
     return result
 
 
-def _rows(table: Table, asked: Asked) -> list[str]:
+def _rows(table: Table, asked: TableRequest) -> list[str]:
     for row in asked.rows:
         if row not in ROWS:
             raise unknown_name("row", row, ROWS)
@@ -150,7 +150,7 @@ def _rows(table: Table, asked: Asked) -> list[str]:
     return [row for row in ROWS if row in wanted]
 
 
-def _cases(table: Table, asked: Asked) -> tuple[list[Case], dict[str, str]]:
+def _cases(table: Table, asked: TableRequest) -> tuple[list[StreamCase], dict[str, str]]:
     """The cases, and by name why others are not there."""
     if table.kind == "real":
         if asked.real != real.FOLDER and not asked.real.is_dir():
@@ -162,26 +162,28 @@ def _cases(table: Table, asked: Asked) -> tuple[list[Case], dict[str, str]]:
     if table.kind == "still":
         shape, frames = checked_shape(asked.shape or still.SHAPE), checked_count(asked.frames or still.FRAMES)
         names = still.still_scenes(checked_count(asked.still_scenes, "scenes"))
-        return [Case("still", n, seed, shape, frames, 0.0) for n in names for seed in range(asked.seeds)], {}
+        return [StreamCase("still", n, seed, shape, frames, 0.0) for n in names for seed in range(asked.seeds)], {}
     if asked.data is not None:
         return [case for case in phm.dataset_cases(asked.data) if case.scene in asked.scenes], {}
     for scene in asked.scenes:
         if scene not in SCENES:
             raise unknown_name("scene", scene, SCENES)
     return [
-        Case("phm", scene, seed, checked_shape(asked.shape or (250, 400)), _frames(asked, interval), interval, speed)
+        StreamCase(
+            "phm", scene, seed, checked_shape(asked.shape or (250, 400)), _frames(asked, interval), interval, speed
+        )
         for interval, speed, scene, seed in product(asked.intervals, asked.speeds, asked.scenes, range(asked.seeds))
     ], {}
 
 
-def _check_memory(cases: list[Case]) -> None:
+def _check_memory(cases: list[StreamCase]) -> None:
     """Raises InputError where a stream and what is made of it are more than the memory."""
     for case in cases:
         size = case.frames * case.shape[0] * case.shape[1] * BYTES
         checked_memory(size, f"{case.scene}, {case.frames} frames of {case.shape[0]} x {case.shape[1]},")
 
 
-def _frames(asked: Asked, interval: float) -> int:
+def _frames(asked: TableRequest, interval: float) -> int:
     if asked.frames is not None and asked.frames < LEAST_FRAMES:
         raise InputError(
             f"frames = {asked.frames}; it must be at least {LEAST_FRAMES}: the picture is of the middle frame, and "
@@ -190,7 +192,7 @@ def _frames(asked: Asked, interval: float) -> int:
     return asked.frames or phm.default_frames(interval)
 
 
-def _settings(asked: Asked) -> dict[str, Any]:
+def _settings(asked: TableRequest) -> dict[str, Any]:
     """What all results of a file share; scenes, seeds, intervals, speeds and rows can be added to it."""
     return {
         "shape": None if asked.shape is None else list(asked.shape),
@@ -200,14 +202,14 @@ def _settings(asked: Asked) -> dict[str, Any]:
 
 
 def _made(
-    cases: list[Case],
+    cases: list[StreamCase],
     rows: list[str],
     columns: list[str],
-    asked: Asked,
+    asked: TableRequest,
     results: Results,
     pictures: Path | None,
     progress: bool,
-) -> list[Record]:
+) -> list[RowResult]:
     """All records, those that were there and those made now, in the order of cases and rows."""
     drawn = {case.scene: case for case in reversed(cases)}  # the first of each scene
     wanted = [
@@ -231,8 +233,8 @@ def _made(
 def _result(
     name: str,
     rows: list[str],
-    cases: list[Case],
-    records: list[Record],
+    cases: list[StreamCase],
+    records: list[RowResult],
     missing: dict[str, str],
     sizes: dict[str, int | None],
 ) -> dict[str, Any]:

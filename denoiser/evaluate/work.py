@@ -18,8 +18,8 @@ from typing import Any
 import numpy as np
 
 from denoiser.evaluate import phm, real, still
-from denoiser.evaluate.exposed import CLASSICAL, Case, Exposed
-from denoiser.evaluate.judge import Record, display, judged, pictures_of
+from denoiser.evaluate.exposed import CLASSICAL, ExposedStreams, StreamCase
+from denoiser.evaluate.judge import RowResult, display, judged, pictures_of
 from denoiser.evaluate.rows import ROWS, Weights, planes_a_pass, streams, weights_of
 from spikecam_env.errors import InputError, shown
 from spikecam_env.stopping import without_interrupts
@@ -27,16 +27,20 @@ from spikecam_env.untrusted import declared, parse_json, read_text
 from spikecam_env.whole import whole_file, write_text_whole
 
 FORMAT = "spikecam-evaluation/1"
-_EXPOSE: dict[str, Callable[[Case], Exposed]] = {"phm": phm.expose, "real": real.expose, "still": still.expose}
+_EXPOSE: dict[str, Callable[[StreamCase], ExposedStreams]] = {
+    "phm": phm.expose,
+    "real": real.expose,
+    "still": still.expose,
+}
 LIGHT = "light"
 """Name of the picture of the true light."""
 
 
 @dataclass(frozen=True)
-class Task:
+class WorkItem:
     """Some rows of one source of one case.  pictures: a folder for PNG files of what the rows show, or None."""
 
-    case: Case
+    case: StreamCase
     source: str
     rows: tuple[str, ...]
     columns: tuple[str, ...]
@@ -51,7 +55,7 @@ class Results:
 
     path: Path | None
     settings: dict[str, Any]
-    records: dict[tuple[Any, ...], Record]
+    records: dict[tuple[Any, ...], RowResult]
 
     @classmethod
     def opened(cls, path: Path | None, settings: dict[str, Any]) -> Results:
@@ -66,11 +70,11 @@ class Results:
             was = ", ".join(f"{name} {shown(found.get(name))} (asked: {settings[name]})" for name in different)
             raise InputError(f"{path} holds results of other settings: {was}; ask for the same, or another folder")
         records = [
-            declared(Record, parse_json(line, str(path)), f"{path}, line {i}") for i, line in enumerate(lines, 2)
+            declared(RowResult, parse_json(line, str(path)), f"{path}, line {i}") for i, line in enumerate(lines, 2)
         ]
         return cls(path, settings, {record.key: record for record in records})
 
-    def add(self, records: Iterable[Record]) -> None:
+    def add(self, records: Iterable[RowResult]) -> None:
         """Take records in, and write the file."""
         self.records.update({record.key: record for record in records})
         if self.path is not None:
@@ -79,21 +83,21 @@ class Results:
 
 
 def tasks(
-    case: Case, rows: Sequence[str], columns: Sequence[str], weights: Weights, pictures: Path | None
-) -> list[Task]:
+    case: StreamCase, rows: Sequence[str], columns: Sequence[str], weights: Weights, pictures: Path | None
+) -> list[WorkItem]:
     """The work on a case, a task for each source of its rows."""
     return [
-        Task(case, source, tuple(r for r in rows if ROWS[r].source == source), tuple(columns), weights, pictures)
+        WorkItem(case, source, tuple(r for r in rows if ROWS[r].source == source), tuple(columns), weights, pictures)
         for source in dict.fromkeys(ROWS[row].source for row in rows)
     ]
 
 
-def undone(asked: Sequence[Task], results: Results) -> list[Task]:
+def undone(asked: Sequence[WorkItem], results: Results) -> list[WorkItem]:
     """The tasks that have rows without a result, or one of other weights."""
     return [task for task in asked if not all(_is_done(task, row, results) for row in task.rows)]
 
 
-def work(todo: Sequence[Task], jobs: int = 1) -> Iterator[list[Record]]:
+def work(todo: Sequence[WorkItem], jobs: int = 1) -> Iterator[list[RowResult]]:
     """Records of the tasks, as they are done.  jobs: processes; 1 works in this one.
 
     Raises InputError where a process dies.
@@ -116,7 +120,7 @@ def work(todo: Sequence[Task], jobs: int = 1) -> Iterator[list[Record]]:
         pool.shutdown(wait=False, cancel_futures=True)
 
 
-def do(task: Task) -> list[Record]:
+def do(task: WorkItem) -> list[RowResult]:
     """One task, done here."""
     exposed = _EXPOSE[task.case.kind](task.case)
     made = streams(task.source, list(task.rows), task.case, exposed, task.weights)
@@ -127,17 +131,17 @@ def do(task: Task) -> list[Record]:
         shown = pictures_of(spikes, planes, exposed, columns)
         passes = planes_a_pass(task.source, task.weights)
         found = judged(shown, spikes, planes, exposed, passes, still=task.case.kind == "still")
-        records.append(Record(**_key(task.case), row=row, weights=_identity(task), **found))
+        records.append(RowResult(**_key(task.case), row=row, weights=_identity(task), **found))
         _save_pictures(task, row, shown, exposed)
     return records
 
 
-def picture_path(folder: Path, case: Case, row: str, column: str) -> Path:
+def picture_path(folder: Path, case: StreamCase, row: str, column: str) -> Path:
     """Of what a row shows in a column."""
     return folder / f"{case.scene.replace(' ', '-')}-{row}-{column}.png"
 
 
-def _save_pictures(task: Task, row: str, shown: dict[str, np.ndarray], exposed: Exposed) -> None:
+def _save_pictures(task: WorkItem, row: str, shown: dict[str, np.ndarray], exposed: ExposedStreams) -> None:
     if task.pictures is None:
         return
     for column, found in shown.items():
@@ -154,16 +158,16 @@ def _save(path: Path, shown: np.ndarray) -> None:
         Image.fromarray((255 * shown + 0.5).astype(np.uint8)).save(beside)
 
 
-def _key(case: Case) -> dict[str, Any]:
+def _key(case: StreamCase) -> dict[str, Any]:
     return {"scene": case.scene, "seed": case.seed, "interval": case.interval, "speed": case.speed}
 
 
-def _identity(task: Task) -> dict[str, str | None]:
+def _identity(task: WorkItem) -> dict[str, str | None]:
     names = [weights_of(task.source), *(c for c in task.columns if c not in CLASSICAL)]
     return {name: task.weights.digest(name) for name in names if name is not None}
 
 
-def _is_done(task: Task, row: str, results: Results) -> bool:
+def _is_done(task: WorkItem, row: str, results: Results) -> bool:
     found = results.records.get((*_key(task.case).values(), row))
     return found is not None and found.weights == _identity(task) and set(task.columns) <= set(found.pictures)
 

@@ -29,7 +29,7 @@ from denoiser.live.ring import Ring
 from denoiser.online import OnlineDnSS
 from denoiser.pixel_map import PixelMap
 from denoiser.weights import load_weights
-from denoiser.window import RollingWindow, Window
+from denoiser.window import PassWindow, RollingWindow
 from spikecam_env.checked import checked_count, checked_shape, checked_whole
 from spikecam_env.errors import InputError, NotReadyError
 
@@ -110,7 +110,7 @@ class LiveDnSS:
         """Forget the stream."""
         self.ring = Ring(self.shape, self._room)
         """Where frames are kept; a reader of files or sockets writes to it directly (`lend`, `took`)."""
-        self.window: Window | None = None
+        self.window: PassWindow | None = None
         """What the network saw for the last picture; its `start` is a frame of the stream."""
         self.rates: NDArray[np.float32] | None = None
         """(planes, H, W) [spikes/frame], all frames of the last pass."""

@@ -30,7 +30,7 @@ LABEL_REACH = 40
 
 
 @dataclass(frozen=True)
-class Windows:
+class LessonWindows:
     """Of many streams: spikes (N, T, H, W) uint8 and light (N, T, H, W) float32 of the last T frames.
 
     old: (N,) bool, whether all T frames are of one stream.
@@ -40,9 +40,9 @@ class Windows:
     light: Tensor
     old: Tensor
 
-    def copy(self) -> Windows:
+    def copy(self) -> LessonWindows:
         """The same frames, to keep."""
-        return Windows(self.spikes.clone(), self.light.clone(), self.old)
+        return LessonWindows(self.spikes.clone(), self.light.clone(), self.old)
 
     def middle(self) -> Tensor:
         """(N, 41, H, W) the frames that a reconstructor sees."""
@@ -56,7 +56,7 @@ class Lesson(Protocol):
     span: int
     networks: nn.ModuleDict
 
-    def losses(self, windows: Windows, number_type: torch.dtype) -> Tensor:
+    def losses(self, windows: LessonWindows, number_type: torch.dtype) -> Tensor:
         """(N,) float32, a loss for each stream."""
 
 
@@ -73,7 +73,7 @@ class Supervised:
     def __init__(self, recipe: ReconstructorRecipe) -> None:
         self.networks = nn.ModuleDict({"student": recipe.network()})
 
-    def losses(self, windows: Windows, number_type: torch.dtype) -> Tensor:
+    def losses(self, windows: LessonWindows, number_type: torch.dtype) -> Tensor:
         spikes = _shown(windows.middle(), number_type)
         found, estimates = self.networks["student"].with_estimates(spikes)  # type: ignore[operator]
         of_blocks = _distance(estimates, windows.light[:, CENTRES[0] : CENTRES[-1] + 1 : CENTRES[1] - CENTRES[0]])
@@ -88,7 +88,7 @@ class SelfTaught:
     def __init__(self, recipe: ReconstructorRecipe) -> None:
         self.networks = nn.ModuleDict({"student": recipe.network(), "blind": ssml.Blind(recipe.width)})
 
-    def losses(self, windows: Windows, number_type: torch.dtype) -> Tensor:
+    def losses(self, windows: LessonWindows, number_type: torch.dtype) -> Tensor:
         blind = self._blind(windows.middle(), number_type)
         student = self.networks["student"](_shown(windows.middle(), number_type))
         label = ssml.interval_rate(windows.spikes, self.span // 2)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import torch
 from torch import Tensor
 
-from denoiser.reconstruct.lessons import Windows
+from denoiser.reconstruct.lessons import LessonWindows
 from denoiser.simulated import SimulatedStreams
 
 
@@ -22,13 +22,13 @@ class RollingWindows:
         self._light = torch.zeros(shape, device=device)
         self._age = torch.zeros(streams.count, dtype=torch.int64, device=device)
 
-    def advance(self, frames: int) -> Windows:
+    def advance(self, frames: int) -> LessonWindows:
         """Go on by `frames`; the windows that end there, which the next call overwrites."""
         part = self.streams.advance(frames)
         _push(self._spikes, part.spikes[self._kind])
         _push(self._light, part.light)
         self._age.copy_(torch.where(part.begins, 0, self._age) + frames)
-        return Windows(self._spikes, self._light, self._age >= self._spikes.shape[1])
+        return LessonWindows(self._spikes, self._light, self._age >= self._spikes.shape[1])
 
 
 def _push(held: Tensor, new: Tensor) -> None:

@@ -23,7 +23,7 @@ from torch import Tensor, nn
 from denoiser.captured import captured, checked_compiler
 from denoiser.number_type import computing_in, number_type
 from denoiser.reconstruct import ssml
-from denoiser.reconstruct.lessons import Lesson, Windows, lesson_of
+from denoiser.reconstruct.lessons import Lesson, LessonWindows, lesson_of
 from denoiser.reconstruct.recipe import ReconstructorRecipe, reconstructor_recipe
 from denoiser.reconstruct.rolling import RollingWindows
 from denoiser.reconstruct.spk2imgnet import WINDOW
@@ -172,7 +172,7 @@ def _windows(config: ReconstructorConfig, step: int, span: int) -> RollingWindow
     return RollingWindows(streams, twin, span)
 
 
-def _held_out(config: ReconstructorConfig) -> list[Windows]:
+def _held_out(config: ReconstructorConfig) -> list[LessonWindows]:
     """Windows of other streams at a few moments."""
     seed, device = config.seed + VALIDATION_SEED, torch.device(config.device)
     bank = Bank.drawn(seed, device, textures=VALIDATION_TEXTURES, units=VALIDATION_UNITS)
@@ -182,7 +182,7 @@ def _held_out(config: ReconstructorConfig) -> list[Windows]:
     return [rolling.advance(FRAMES_BETWEEN_MOMENTS).copy() for _ in range(VALIDATION_MOMENTS)]
 
 
-def validate(network: nn.Module, held_out: list[Windows]) -> dict[str, float]:
+def validate(network: nn.Module, held_out: list[LessonWindows]) -> dict[str, float]:
     """Error of the light over held-out windows, as PSNR [dB] against light 1.0: network, TFP 21, TFP 41, TFI."""
     network.eval()
     sums: dict[str, float] = {}

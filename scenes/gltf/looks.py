@@ -20,10 +20,11 @@ from scenes.gltf.container import File, Tree
 from scenes.gltf.nodes import extension
 from scenes.gltf.shapes import Shape, Table
 from scenes.materials import UNSTATED_ALBEDO, colour_of, pixels_of
-from scenes.transfer import Array, grey, linear_from_srgb
+from scenes.transfer import grey, linear_from_srgb
 from scenes.unshown import ALPHA_MASK, NO_COORDINATES, TRANSPARENCY
 from scenes.wrapping import CLAMP, KEEP, MIRROR, unrolled
 from spikecam_env.errors import InputError
+from spikecam_env.types import Pictures
 
 WRAPS = {10497: KEEP, 33071: CLAMP, 33648: MIRROR}
 """Of a sampler, by OpenGL's numbers; renderers repeat what is kept."""
@@ -56,8 +57,8 @@ class Looks:
 
     def __init__(self, file: File, own: bool) -> None:
         self._file, self._own = file, own
-        self._pixels: dict[int, tuple[Array, Array] | None] = {}
-        self._textures: dict[tuple[int, bytes], Array] = {}
+        self._pixels: dict[int, tuple[Pictures, Pictures] | None] = {}
+        self._textures: dict[tuple[int, bytes], Pictures] = {}
 
     def of(self, whole: Shape, primitive: Tree) -> Look | None:
         """The look of a primitive; None where alpha hides it.
@@ -86,7 +87,7 @@ class Looks:
             return Look(_plain(texture, colours), uv, emission)
         return Look(*unrolled(texture, uv, *self._wraps(info)), emission)
 
-    def _shaded(self, number: int, factor: Array | None, colours: Table | None) -> tuple[Array, Table | None]:
+    def _shaded(self, number: int, factor: Pictures | None, colours: Table | None) -> tuple[Pictures, Table | None]:
         """A picture times all colours, (h, w).
 
         Where it has one colour and the vertices several: that colour (3,), and those of the vertices.
@@ -135,7 +136,7 @@ class Looks:
             return None
         return None if self._opened(number) is None else int(number)
 
-    def _opened(self, number: int) -> tuple[Array, Array] | None:
+    def _opened(self, number: int) -> tuple[Pictures, Pictures] | None:
         """Colours (h, w, 3) and alpha (h, w) of an image; None, with a note, where it is not there or damaged."""
         if number not in self._pixels:
             self._pixels[number] = None
@@ -163,13 +164,13 @@ class Looks:
                 self._file.without(f"image {number} (damaged, or in no known format)")
             return None
 
-    def _decoded(self, number: int) -> tuple[Array, Array]:
+    def _decoded(self, number: int) -> tuple[Pictures, Pictures]:
         pixels = self._opened(number)
         if pixels is None:
             raise RuntimeError("only images that could be decoded have a number here")
         return pixels
 
-    def _texture(self, number: int, shade: Array) -> Array:
+    def _texture(self, number: int, shade: Pictures) -> Pictures:
         """(h, w) albedo of an image times a colour; the same array for the same two."""
         key = (number, np.float32(shade).tobytes())
         if key not in self._textures:
@@ -232,7 +233,7 @@ def _checked(colours: Table | None) -> Table | None:
     return np.concatenate([colours, np.ones((len(colours), 4 - colours.shape[1]))], 1)
 
 
-def _plain(factor: Array | None, colours: Table | None) -> Albedo:
+def _plain(factor: Pictures | None, colours: Table | None) -> Albedo:
     """Of a part without a picture."""
     if factor is None and colours is None:
         return UNSTATED_ALBEDO

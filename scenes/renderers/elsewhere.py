@@ -19,7 +19,7 @@ from weakref import WeakKeyDictionary, finalize
 import numpy as np
 from numpy.typing import NDArray
 
-from scenes.renderers.protocol import Lighting, Pinhole, Sprite, Surface, Window
+from scenes.renderers.protocol import Lighting, PictureWindow, Pinhole, Sprite, Surface
 from spikecam_env.errors import NotReadyError
 
 
@@ -51,7 +51,7 @@ class Elsewhere:
         pose: NDArray[np.float64],
         camera: Pinhole,
         lighting: Lighting,
-        window: Window,
+        window: PictureWindow,
         supersample: int = 2,
     ) -> Sprite:
         if not self.close.alive:

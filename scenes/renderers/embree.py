@@ -19,9 +19,9 @@ from embreex.mesh_construction import TriangleMesh
 from embreex.rtcore_scene import EmbreeScene
 from numpy.typing import NDArray
 
-from scenes.renderers.protocol import Lighting, Pinhole, Sprite, Surface, Window
+from scenes.renderers.protocol import Lighting, PictureWindow, Pinhole, Sprite, Surface
 from scenes.renderers.pyramid import SHARPER
-from scenes.renderers.view import Geometry, blank, checked, geometry, moved, pasted, reached, to_camera, towards
+from scenes.renderers.view import SurfaceArrays, blank, checked, geometry, moved, pasted, reached, to_camera, towards
 from spikecam_env.compiled import njit
 
 RAYS_AT_ONCE = 1 << 18
@@ -42,7 +42,7 @@ class Embree:
         pose: NDArray[np.float64],
         camera: Pinhole,
         lighting: Lighting,
-        window: Window,
+        window: PictureWindow,
         supersample: int = 2,
     ) -> Sprite:
         checked(window, supersample)
@@ -87,7 +87,7 @@ class Embree:
 class _Traceable:
     """A surface in embree, shifted and scaled to a unit cube: embree computes in single precision."""
 
-    def __init__(self, geometry: Geometry) -> None:
+    def __init__(self, geometry: SurfaceArrays) -> None:
         self.geometry = geometry
         self._middle = (geometry.vertices.min(axis=0) + geometry.vertices.max(axis=0)) / 2
         self._size = np.ptp(geometry.vertices, axis=0).max()

@@ -20,11 +20,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scenes.renderers import contexts
-from scenes.renderers.protocol import Lighting, Pinhole, Sprite, Surface, Window
+from scenes.renderers.protocol import Lighting, PictureWindow, Pinhole, Sprite, Surface
 from scenes.renderers.pyramid import SHARPER, Pyramid
 from scenes.renderers.view import (
     NEAREST,
-    Geometry,
+    SurfaceArrays,
     blank,
     checked,
     geometry,
@@ -78,7 +78,7 @@ class OpenGL:
         pose: NDArray[np.float64],
         camera: Pinhole,
         lighting: Lighting,
-        window: Window,
+        window: PictureWindow,
         supersample: int = 2,
     ) -> Sprite:
         checked(window, supersample)
@@ -142,7 +142,7 @@ class OpenGL:
         gl.glUniform1f(at("levels"), float(len(uploaded.geometry.albedo.start)))
         gl.glUniform1f(at("sharper"), SHARPER)
 
-    def _abilities(self, geometry: Geometry, matrix: NDArray[np.float64]) -> list[Any]:
+    def _abilities(self, geometry: SurfaceArrays, matrix: NDArray[np.float64]) -> list[Any]:
         """Without back faces where they are hidden, in a closed surface seen from outside: a quarter faster."""
         gl = self._gl
         gl.glFrontFace(gl.GL_CW if np.linalg.det(matrix) > 0 else gl.GL_CCW)  # in the picture y points down
@@ -152,7 +152,12 @@ class OpenGL:
         return [gl.GL_SCISSOR_TEST, gl.GL_DEPTH_TEST, *hidden]
 
     def _draw(
-        self, uploaded: _Uploaded, to_window: NDArray[np.float64], tile: Window, supersample: int, abilities: list[Any]
+        self,
+        uploaded: _Uploaded,
+        to_window: NDArray[np.float64],
+        tile: PictureWindow,
+        supersample: int,
+        abilities: list[Any],
     ) -> None:
         gl = self._gl
         targets = self._targets_for(tile, supersample)
@@ -181,7 +186,7 @@ class OpenGL:
         gl.glBindVertexArray(self._nothing)
         gl.glDrawArrays(gl.GL_TRIANGLES, 0, 3)
 
-    def _read(self, sprite: Sprite, tile: Window) -> None:
+    def _read(self, sprite: Sprite, tile: PictureWindow) -> None:
         gl = self._gl
         values = np.empty((tile.rows, tile.columns, 4), np.float32)
         gl.glReadPixels(0, 0, tile.columns, tile.rows, gl.GL_RGBA, gl.GL_FLOAT, values)
@@ -189,7 +194,7 @@ class OpenGL:
         inside = np.s_[top : top + tile.rows, left : left + tile.columns]
         _split(values, sprite.radiance[inside], sprite.coverage[inside], sprite.depth[inside])
 
-    def _targets_for(self, tile: Window, supersample: int) -> _Targets:
+    def _targets_for(self, tile: PictureWindow, supersample: int) -> _Targets:
         rows, columns = tile.rows * supersample, tile.columns * supersample
         if self._targets is None or rows > self._targets.rows or columns > self._targets.columns:
             if self._targets is not None:
@@ -214,12 +219,12 @@ class OpenGL:
 class _Uploaded:
     """A surface in OpenGL's memory."""
 
-    geometry: Geometry
+    geometry: SurfaceArrays
     primitive: Any
     texture: int
 
     @classmethod
-    def of(cls, geometry: Geometry) -> _Uploaded:
+    def of(cls, geometry: SurfaceArrays) -> _Uploaded:
         from pyrender import Primitive
 
         primitive = Primitive(geometry.vertices, geometry.normals, texcoord_0=geometry.uv, indices=geometry.faces)
@@ -294,7 +299,7 @@ def _split(
             depth[row, x] = values[row, x, 2] if values[row, x, 1] != 0 else np.inf
 
 
-def _to_window(camera: Pinhole, window: Window, near: float, far: float) -> NDArray[np.float64]:
+def _to_window(camera: Pinhole, window: PictureWindow, near: float, far: float) -> NDArray[np.float64]:
     """(4, 4) camera to clip coordinates of a window: pixel centres at half cells, the picture's first row first."""
     matrix = np.zeros((4, 4))
     matrix[0, 0] = 2 * camera.focal / window.columns
@@ -306,11 +311,11 @@ def _to_window(camera: Pinhole, window: Window, near: float, far: float) -> NDAr
     return matrix
 
 
-def _tiles(window: Window, side: int) -> Iterator[Window]:
+def _tiles(window: PictureWindow, side: int) -> Iterator[PictureWindow]:
     for top in range(window.top, window.top + window.rows, side):
         rows = min(side, window.top + window.rows - top)
         for left in range(window.left, window.left + window.columns, side):
-            yield Window(top, left, rows, min(side, window.left + window.columns - left))
+            yield PictureWindow(top, left, rows, min(side, window.left + window.columns - left))
 
 
 def _float_target(rows: int, columns: int) -> tuple[int, int]:

@@ -19,7 +19,8 @@ import numpy as np
 import trimesh
 from numpy.typing import NDArray
 
-Array = NDArray[np.float32]
+from spikecam_env.renamed import old_names
+from spikecam_env.types import Pictures
 
 
 @dataclass(frozen=True, eq=False)
@@ -33,7 +34,7 @@ class Surface:
     """
 
     mesh: trimesh.Trimesh
-    albedo: float | Array = 0.8
+    albedo: float | Pictures = 0.8
     emission: float = 0.0
 
     @cached_property
@@ -65,7 +66,7 @@ class Lighting:
 
 
 @dataclass(frozen=True)
-class Window:
+class PictureWindow:
     """A part of the picture: rows top .. top + rows - 1, columns left .. left + columns - 1; may lie outside it."""
 
     top: int
@@ -83,10 +84,10 @@ class Sprite:
     depth     (rows, columns) float32, distance along the camera's axis; inf where nothing is covered
     """
 
-    window: Window
-    radiance: Array
-    coverage: Array
-    depth: Array
+    window: PictureWindow
+    radiance: Pictures
+    coverage: Pictures
+    depth: Pictures
 
 
 class Renderer(Protocol):
@@ -101,7 +102,7 @@ class Renderer(Protocol):
         pose: NDArray[np.float64],
         camera: Pinhole,
         lighting: Lighting,
-        window: Window,
+        window: PictureWindow,
         supersample: int = 2,
     ) -> Sprite:
         """The surface at `pose` (4, 4: its coordinates to the world), averaged over supersample x supersample rays a
@@ -111,3 +112,6 @@ class Renderer(Protocol):
     def close(self) -> None:
         """Give back what the back-end holds."""
         ...
+
+
+__getattr__ = old_names(__name__, {"Window": "PictureWindow"})

@@ -18,7 +18,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from scenes.renderers.protocol import Array
+from spikecam_env.types import Pictures
 
 SHARPER = -0.5
 """Added to the level: the box over a pixel's rays filters too.  The picture above: 1.10 % at -1, 1.11 % at 0."""
@@ -33,19 +33,19 @@ class Pyramid:
     shape    (L, 2) int64, its (h, w)
     """
 
-    texels: Array
+    texels: Pictures
     start: NDArray[np.int64]
     shape: NDArray[np.int64]
 
-    def level(self, index: int) -> Array:
+    def level(self, index: int) -> Pictures:
         """(h, w), a view."""
         height, width = self.shape[index]
         return self.texels[self.start[index] : self.start[index] + height * width].reshape(height, width)
 
 
-def pyramid(texture: Array) -> Pyramid:
+def pyramid(texture: Pictures) -> Pyramid:
     """All halvings of a texture (h, w) down to one texel; sizes as OpenGL's: floor(h / 2^l), at least 1."""
-    levels: list[Array] = [np.ascontiguousarray(texture, np.float32)]
+    levels: list[Pictures] = [np.ascontiguousarray(texture, np.float32)]
     while levels[-1].size > 1:
         height, width = (max(1, side // 2) for side in levels[-1].shape)
         smaller = cv2.resize(levels[-1], (width, height), interpolation=cv2.INTER_AREA)

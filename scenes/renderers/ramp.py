@@ -9,14 +9,14 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from scenes.renderers.protocol import Array
 from scenes.renderers.pyramid import Pyramid
+from spikecam_env.types import Pictures
 
 STEPS = 256
 """Texels.  A graphics card knows 1/256 of the way between two, so albedo to 1.5e-5."""
 
 
-def ramp(steps: int = STEPS) -> Array:
+def ramp(steps: int = STEPS) -> Pictures:
     """(1, steps) float32 from 0 to 1."""
     return np.linspace(0, 1, steps, dtype=np.float32)[None]
 

@@ -12,7 +12,7 @@ import numpy as np
 import trimesh
 from numpy.typing import ArrayLike, NDArray
 
-from scenes.renderers.protocol import Lighting, Pinhole, Sprite, Surface, Window
+from scenes.renderers.protocol import Lighting, PictureWindow, Pinhole, Sprite, Surface
 from scenes.renderers.pyramid import Pyramid, pyramid
 from scenes.renderers.ramp import places, ramp_level
 from spikecam_env.errors import InputError
@@ -24,7 +24,7 @@ NEAREST = 1e-3
 
 
 @dataclass(frozen=True)
-class Geometry:
+class SurfaceArrays:
     """A surface as arrays.
 
     vertices, normals  (V, 3) float64
@@ -43,7 +43,7 @@ class Geometry:
     closed: bool
 
 
-def geometry(surface: Surface) -> Geometry:
+def geometry(surface: Surface) -> SurfaceArrays:
     """Errors: InputError for a mesh that `check_mesh` refuses, a texture without uv, or an albedo that is not one
     value, (V,) or (h, w), in 0 to 1."""
     mesh = surface.mesh
@@ -67,7 +67,7 @@ def geometry(surface: Surface) -> Geometry:
         uv = np.array(uv, np.float64)[:, :2]
     else:
         uv = places(albedo) if albedo.ndim == 1 else np.zeros((len(mesh.vertices), 2))
-    return Geometry(
+    return SurfaceArrays(
         vertices=np.array(mesh.vertices, np.float64),
         normals=np.array(mesh.vertex_normals, np.float64),
         uv=uv,
@@ -125,7 +125,7 @@ def moved(points: NDArray[np.float64], matrix: NDArray[np.float64]) -> NDArray[n
     return np.asarray(points @ matrix[:3, :3].T + matrix[:3, 3])
 
 
-def reached(vertices: NDArray[np.float64], camera: Pinhole, window: Window) -> Window | None:
+def reached(vertices: NDArray[np.float64], camera: Pinhole, window: PictureWindow) -> PictureWindow | None:
     """The part of the window that these vertices (N, 3) in camera coordinates can cover; None where none."""
     distance = -vertices[:, 2]
     if distance.max() <= 0:
@@ -136,7 +136,7 @@ def reached(vertices: NDArray[np.float64], camera: Pinhole, window: Window) -> W
     y = camera.centre[1] - camera.focal * vertices[:, 1] / distance
     left, right = _overlap(x, window.left, window.columns)
     top, bottom = _overlap(y, window.top, window.rows)
-    return Window(top, left, bottom - top, right - left) if top < bottom and left < right else None
+    return PictureWindow(top, left, bottom - top, right - left) if top < bottom and left < right else None
 
 
 def towards(lighting: Lighting) -> NDArray[np.float64]:
@@ -148,13 +148,13 @@ def towards(lighting: Lighting) -> NDArray[np.float64]:
     return np.asarray(direction / length)
 
 
-def blank(window: Window) -> Sprite:
+def blank(window: PictureWindow) -> Sprite:
     """A sprite that covers nothing."""
     size = (window.rows, window.columns)
     return Sprite(window, np.zeros(size, np.float32), np.zeros(size, np.float32), np.full(size, np.inf, np.float32))
 
 
-def pasted(part: Sprite, window: Window) -> Sprite:
+def pasted(part: Sprite, window: PictureWindow) -> Sprite:
     """A sprite of a window, of which only a part was drawn."""
     if part.window == window:
         return part
@@ -165,7 +165,7 @@ def pasted(part: Sprite, window: Window) -> Sprite:
     return whole
 
 
-def checked(window: Window, supersample: int) -> None:
+def checked(window: PictureWindow, supersample: int) -> None:
     """Errors: InputError for an empty window or no rays."""
     if window.rows < 1 or window.columns < 1:
         raise InputError(f"the window has {window.rows} rows and {window.columns} columns; it needs some of each")

@@ -14,8 +14,8 @@ from typing import Generic, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from scenes.layers import Key
-from scenes.renderers.protocol import Pinhole, Sprite, Window
+from scenes.layers import BodyKey
+from scenes.renderers.protocol import PictureWindow, Pinhole, Sprite
 from scenes.world.extent import Probe, probe_of
 from scenes.world.plan import BlockPlan, Pace
 from scenes.world.spec import WorldSpec
@@ -44,10 +44,10 @@ class Sight:
     pose: NDArray[np.float64]
     camera: Pinhole
     view: NDArray[np.float64]
-    window: Window
+    window: PictureWindow
 
 
-class Recent(Generic[T]):
+class RecentResults(Generic[T]):
     """The results asked for most recently, by name: at most `most` of them, and at least one."""
 
     def __init__(self, most: int) -> None:
@@ -57,7 +57,7 @@ class Recent(Generic[T]):
     def __len__(self) -> int:
         return len(self._kept)
 
-    def take(self, other: Recent[T]) -> None:
+    def take(self, other: RecentResults[T]) -> None:
         """Know what another one knows."""
         self._kept.update(other._kept)
 
@@ -86,27 +86,27 @@ class WorldCache:
     base        1 picture of all that stands still behind the bodies
     """
 
-    plans: Recent[BlockPlan]
-    paces: Recent[Pace]
-    probes: Recent[Probe]
-    sights: Recent[Sight]
-    keys: Recent[Key]
-    backdrops: Recent[Sprite]
-    tile: Recent[NDArray[np.float32]]
-    base: Recent[NDArray[np.float32]]
+    plans: RecentResults[BlockPlan]
+    paces: RecentResults[Pace]
+    probes: RecentResults[Probe]
+    sights: RecentResults[Sight]
+    keys: RecentResults[BodyKey]
+    backdrops: RecentResults[Sprite]
+    tile: RecentResults[NDArray[np.float32]]
+    base: RecentResults[NDArray[np.float32]]
 
     @classmethod
     def of(cls, bodies: int) -> WorldCache:
         """An empty one for a world of so many bodies."""
         return cls(
-            plans=Recent(PLANS),
-            paces=Recent(PLANS * bodies),
-            probes=Recent(bodies),
-            sights=Recent(KEYS_A_BODY * bodies + KEYS_MORE),
-            keys=Recent(KEYS_A_BODY * bodies + KEYS_MORE),
-            backdrops=Recent(BACKDROPS_A_BODY * bodies),
-            tile=Recent(1),
-            base=Recent(1),
+            plans=RecentResults(PLANS),
+            paces=RecentResults(PLANS * bodies),
+            probes=RecentResults(bodies),
+            sights=RecentResults(KEYS_A_BODY * bodies + KEYS_MORE),
+            keys=RecentResults(KEYS_A_BODY * bodies + KEYS_MORE),
+            backdrops=RecentResults(BACKDROPS_A_BODY * bodies),
+            tile=RecentResults(1),
+            base=RecentResults(1),
         )
 
     def take_motion(self, other: WorldCache) -> None:

@@ -9,7 +9,8 @@ import trimesh
 from numpy.typing import NDArray
 
 from scenes.layers import project
-from scenes.renderers.protocol import Window
+from scenes.renderers.protocol import PictureWindow
+from spikecam_env.types import Floats
 
 PROBES = 256
 """Points of a body's surface that stand for it in the plan."""
@@ -20,7 +21,6 @@ DIRECTIONS = 100
 FAR = 1 << 20
 """Half a side of the box of a body that reaches behind the camera [pixels]."""
 
-Floats = NDArray[np.float64]
 Boxes = NDArray[np.int64]
 
 
@@ -64,12 +64,12 @@ def extent(extreme: Floats, view: Floats, focal: float, centre: Floats) -> Boxes
     return np.clip(np.round(box), -FAR, FAR).astype(np.int64)
 
 
-def window_around(box: Boxes, shape: tuple[int, int], margin: int) -> Window:
+def window_around(box: Boxes, shape: tuple[int, int], margin: int) -> PictureWindow:
     """The part of a box (4,) that lies in the picture or `margin` pixels around it."""
     low = np.maximum(box[:2], -margin)
     high = np.minimum(box[2:], np.asarray(shape) + margin)
     size = np.maximum(high - low, 0)
-    return Window(int(low[0]), int(low[1]), int(size[0]), int(size[1]))
+    return PictureWindow(int(low[0]), int(low[1]), int(size[0]), int(size[1]))
 
 
 def boxes_overlap(a: tuple[int, ...], b: tuple[int, ...]) -> bool:

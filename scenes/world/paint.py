@@ -11,7 +11,7 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from scenes.layers import Carried, Key, carry, lay, render_key
+from scenes.layers import BodyKey, Carried, carry, lay, render_key
 from scenes.protocol import Gaze
 from scenes.world.cache import WorldCache
 from scenes.world.extent import extent
@@ -20,15 +20,13 @@ from scenes.world.sky import sky
 from scenes.world.spec import WorldSpec, gaze_offsets
 from scenes.world.sprites import TRUTH_RAYS, body_sprite, lay_over, sight_of
 from spikecam_env.threads import as_many, pool
+from spikecam_env.types import Floats, Pictures
 
 PIECE = 64
 """Frames that are painted together; while threads paint some, the next bodies are rendered."""
 
 GAZE_MARGIN = 64
 """A key's window grows by steps of so many pixels where a gaze goes, so that the same key serves the next gaze."""
-
-Array = NDArray[np.float32]
-Floats = NDArray[np.float64]
 
 
 def pieces_of(frames: Floats) -> Iterator[tuple[int, slice]]:
@@ -42,7 +40,7 @@ def pieces_of(frames: Floats) -> Iterator[tuple[int, slice]]:
 
 
 def paint(
-    spec: WorldSpec, cache: WorldCache, plan: BlockPlan, frames: Floats, gaze: Gaze | None, pictures: Array
+    spec: WorldSpec, cache: WorldCache, plan: BlockPlan, frames: Floats, gaze: Gaze | None, pictures: Pictures
 ) -> list[Future[None]]:
     """Start to paint pictures (n, H, W) at frames (n,) of the block that is planned; they are done when the futures
     are."""
@@ -62,18 +60,18 @@ def paint(
 # -- what lies behind all layers -------------------------------------------------------------------------------
 
 
-def _skies(spec: WorldSpec, cache: WorldCache, frames: Floats, gaze: Gaze | None) -> Array:
+def _skies(spec: WorldSpec, cache: WorldCache, frames: Floats, gaze: Gaze | None) -> Pictures:
     """(n, H, W)"""
     offsets = gaze_offsets(gaze, frames)
     return np.stack([sky(spec, cache, frame, offset) for frame, offset in zip(frames, offsets, strict=True)])
 
 
-def _still_base(spec: WorldSpec, cache: WorldCache, frame: float) -> Array:
+def _still_base(spec: WorldSpec, cache: WorldCache, frame: float) -> Pictures:
     """(H, W): the sky and the backdrops over it, where nothing of it moves in a block."""
     backdrops = spec.backdrops
     name = (spec.pinhole(frame).pose.tobytes(), *(spec.pose(body, frame).tobytes() for body in backdrops))
 
-    def drawn() -> Array:
+    def drawn() -> Pictures:
         picture = sky(spec, cache, frame, np.zeros(2))
         for body in backdrops:
             lay_over(picture, body_sprite(spec, cache, body, frame, None, TRUTH_RAYS), np.full_like(picture, np.inf))
@@ -93,7 +91,7 @@ class _Part:
     last: int
     before: Carried
     after: Carried
-    share: Array
+    share: Pictures
 
 
 @dataclass(frozen=True, eq=False)
@@ -144,7 +142,7 @@ def _layer(
     return _Layer(parts, boxes, pace.solid, body in plan.tested, body in plan.marked)
 
 
-def _key(spec: WorldSpec, cache: WorldCache, body: int, frame: int, gaze: Gaze | None) -> tuple[Key, Floats]:
+def _key(spec: WorldSpec, cache: WorldCache, body: int, frame: int, gaze: Gaze | None) -> tuple[BodyKey, Floats]:
     """A body's key at a frame, and the map from its coordinates to the camera's then.
 
     Its window is as wide as the picture again on all sides together, and more where a gaze goes."""
@@ -165,7 +163,7 @@ def _key(spec: WorldSpec, cache: WorldCache, body: int, frame: int, gaze: Gaze |
 # -- composition -----------------------------------------------------------------------------------------------
 
 
-def _compose(pictures: Array, base: Array, layers: list[_Layer], start: int, stop: int) -> None:
+def _compose(pictures: Pictures, base: Pictures, layers: list[_Layer], start: int, stop: int) -> None:
     """Pictures start .. stop: the base, (1, H, W) or one a picture, and the layers over it."""
     here = pictures[start:stop]
     here[:] = base if len(base) == 1 else base[start:stop]

@@ -18,6 +18,7 @@ from scenes.protocol import Gaze
 from scenes.renderers.protocol import Lighting
 from scenes.world.extent import Probe, boxes_overlap, extent
 from scenes.world.spec import WorldSpec
+from spikecam_env.types import Floats
 
 BLOCK = 256
 """Frames that are planned together."""
@@ -43,8 +44,6 @@ SHADE = 0.01
 TURN = 0.07
 """Most that a surface's slant to the line of sight changes from key to key, rms of its cosine: a ball may turn by
 0.12 radians, and what comes round its edge is 0.7 % of its radius."""
-
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

@@ -4,17 +4,14 @@ from __future__ import annotations
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 
 from scenes.camera import intrinsic
 from scenes.world.cache import WorldCache
 from scenes.world.spec import WorldSpec
-
-Array = NDArray[np.float32]
-Floats = NDArray[np.float64]
+from spikecam_env.types import Floats, Pictures
 
 
-def sky(spec: WorldSpec, cache: WorldCache, frame: float, offset: Floats) -> Array:
+def sky(spec: WorldSpec, cache: WorldCache, frame: float, offset: Floats) -> Pictures:
     """(H, W) at a frame, by a camera turned by an offset (2,), pan and tilt [pixels]."""
     if np.ndim(spec.background) == 0:
         return np.full(spec.shape, float(spec.background) * spec.light, np.float32)
@@ -30,7 +27,7 @@ def sky(spec: WorldSpec, cache: WorldCache, frame: float, offset: Floats) -> Arr
     )
 
 
-def _tile(spec: WorldSpec) -> Array:
+def _tile(spec: WorldSpec) -> Pictures:
     """The background at one texel a pixel."""
     picture = np.asarray(spec.background, np.float32) * np.float32(spec.light)
     columns = max(1, round(picture.shape[1] * spec.shape[0] / picture.shape[0]))

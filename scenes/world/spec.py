@@ -6,7 +6,6 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from scenes.camera import Camera
 from scenes.protocol import Gaze
@@ -14,9 +13,7 @@ from scenes.renderers.protocol import Lighting, Pinhole, Renderer, Surface
 from scenes.renderers.shared import shared_renderer
 from scenes.trajectories import AT_REST, Trajectory
 from spikecam_env.errors import InputError
-
-Array = NDArray[np.float32]
-Floats = NDArray[np.float64]
+from spikecam_env.types import Floats, Pictures
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,7 +42,7 @@ class WorldSpec:
     bodies: tuple[Body, ...]
     camera: Camera = field(default_factory=Camera)
     lighting: Lighting = field(default_factory=Lighting)
-    background: float | Array = 0.1
+    background: float | Pictures = 0.1
     light: float = 1.0
     frame_rate_hz: float = 40_000.0
     motion_per_key: float = 1.0
@@ -117,6 +114,6 @@ def gaze_offsets(gaze: Gaze | None, frames: Floats) -> Floats:
     return np.array([gaze.at(float(frame)) for frame in frames])
 
 
-def _is_light(radiance: float | Array) -> bool:
+def _is_light(radiance: float | Pictures) -> bool:
     values = np.asarray(radiance)
     return values.size > 0 and values.dtype.kind in "fiu" and bool(values.min() >= 0 and values.max() < np.inf)

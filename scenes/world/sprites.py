@@ -8,15 +8,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scenes.protocol import Gaze
-from scenes.renderers.protocol import Pinhole, Sprite, Window
+from scenes.renderers.protocol import PictureWindow, Pinhole, Sprite
 from scenes.world.cache import Sight, WorldCache
 from scenes.world.extent import extent, window_around
 from scenes.world.spec import WorldSpec, gaze_offsets
+from spikecam_env.types import Pictures
 
 TRUTH_RAYS = 4
 """Of a pixel, along either side, where a body is rendered at an instant itself."""
-
-Array = NDArray[np.float32]
 
 
 def body_sprite(spec: WorldSpec, cache: WorldCache, body: int, frame: float, gaze: Gaze | None, rays: int) -> Sprite:
@@ -27,7 +26,7 @@ def body_sprite(spec: WorldSpec, cache: WorldCache, body: int, frame: float, gaz
     seen = sight_of(spec, cache, body, frame, camera, margin=0)
     if not (seen.window.rows and seen.window.columns):
         nothing = np.zeros((0, 0), np.float32)
-        return Sprite(Window(0, 0, 0, 0), nothing, nothing, nothing)
+        return Sprite(PictureWindow(0, 0, 0, 0), nothing, nothing, nothing)
 
     def drawn() -> Sprite:
         surface = spec.bodies[body].surface
@@ -47,7 +46,7 @@ def sight_of(spec: WorldSpec, cache: WorldCache, body: int, frame: float, camera
     return Sight(pose, camera, view, window_around(box, spec.shape, margin))
 
 
-def lay_over(picture: Array, sprite: Sprite, depth: Array) -> NDArray[np.bool_]:
+def lay_over(picture: Pictures, sprite: Sprite, depth: Pictures) -> NDArray[np.bool_]:
     """Lay a sprite over a picture (H, W), in place, but where the picture is nearer.
 
     depth: (H, W) of the picture.  Returns where the sprite is what is seen, of its window.
@@ -59,6 +58,6 @@ def lay_over(picture: Array, sprite: Sprite, depth: Array) -> NDArray[np.bool_]:
     return np.asarray(covered > 0.5)
 
 
-def place_of(window: Window) -> tuple[slice, slice]:
+def place_of(window: PictureWindow) -> tuple[slice, slice]:
     """Rows and columns of the picture."""
     return slice(window.top, window.top + window.rows), slice(window.left, window.left + window.columns)

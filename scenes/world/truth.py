@@ -15,19 +15,17 @@ from scenes.world.plan import BlockPlan
 from scenes.world.sky import sky
 from scenes.world.spec import WorldSpec, gaze_offsets
 from scenes.world.sprites import TRUTH_RAYS, body_sprite, lay_over, place_of
+from spikecam_env.types import Floats, Pictures
 
 _NO_GAZE = Gaze.fixed(0.0, 0.0)
 
-Array = NDArray[np.float32]
-Floats = NDArray[np.float64]
-
 
 @dataclass(frozen=True, eq=False)
-class Seen:
+class VisibleBodies:
     """Pictures (H, W) of an instant.  owner: what is seen, the number of a body from 1, or 0, the background."""
 
-    radiance: Array
-    depth: Array
+    radiance: Pictures
+    depth: Pictures
     owner: NDArray[np.int32]
 
 
@@ -41,7 +39,9 @@ def truth_at(spec: WorldSpec, cache: WorldCache, plan: BlockPlan, frame: float, 
     return Truth(seen.radiance, flow, seen.owner, seen.depth, poses | {"camera": camera})
 
 
-def seen_at(spec: WorldSpec, cache: WorldCache, plan: BlockPlan, frame: float, gaze: Gaze | None, rays: int) -> Seen:
+def seen_at(
+    spec: WorldSpec, cache: WorldCache, plan: BlockPlan, frame: float, gaze: Gaze | None, rays: int
+) -> VisibleBodies:
     """What the camera sees at a frame, by rays x rays a pixel; plan: of the frame's block."""
     picture = sky(spec, cache, frame, gaze_offsets(gaze, np.array([frame]))[0])
     depth = np.full(spec.shape, np.inf, np.float32)
@@ -55,7 +55,7 @@ def seen_at(spec: WorldSpec, cache: WorldCache, plan: BlockPlan, frame: float, g
         owner[place][shown] = body + 1
         if not spec.bodies[body].backdrop:
             nearest[place][shown] = sprite.depth[shown]
-    return Seen(picture, depth, owner)
+    return VisibleBodies(picture, depth, owner)
 
 
 def places_at(spec: WorldSpec, frame: float, gaze: Gaze | None) -> dict[str, tuple[float, float]]:
@@ -75,7 +75,7 @@ def places_at(spec: WorldSpec, frame: float, gaze: Gaze | None) -> dict[str, tup
     return places
 
 
-def _displaced(spec: WorldSpec, seen: Seen, frame: float, by: float, gaze: Gaze | None) -> Floats:
+def _displaced(spec: WorldSpec, seen: VisibleBodies, frame: float, by: float, gaze: Gaze | None) -> Floats:
     """(H, W, 2): where what is seen at a frame has gone `by` frames later [pixels]."""
     now, then = (spec.pinhole(f).pose for f in (frame, frame + by))
     centre = np.asarray(spec.centre)

@@ -25,7 +25,7 @@ from numpy.typing import NDArray
 from denoiser.plain_torch import read_plain, tensors_like
 from denoiser.weights import write_whole
 from spikecam_env.agents.history import History
-from spikecam_env.agents.policy import Policy, Recipe
+from spikecam_env.agents.policy import Policy, PolicyRecipe
 from spikecam_env.envs.registration import TASK_ENVIRONMENTS, register
 from spikecam_env.errors import InputError, unknown_name
 from spikecam_env.untrusted import declared
@@ -62,7 +62,7 @@ class Agent:
         data = read_plain(path)
         if not isinstance(data, dict) or data.get("format") != FORMAT:
             raise InputError(f"{path} holds no agent ({FORMAT}); give a file of `spikecam train-agent`")
-        recipe = declared(Recipe, data.get("recipe"), f"{path}: recipe")
+        recipe = declared(PolicyRecipe, data.get("recipe"), f"{path}: recipe")
         task, obs, training = (data.get(name) for name in ("task", "obs", "training"))
         if not (isinstance(task, str) and isinstance(obs, str) and isinstance(training, dict)):
             raise InputError(f"{path}: task, obs or training is missing; copy the file again")

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 
-class Seen(NamedTuple):
+class PictureHistory(NamedTuple):
     """pictures, state: see the head of this file."""
 
     pictures: NDArray[np.uint8]
@@ -30,7 +30,7 @@ class History:
         self._pictures: list[NDArray[np.uint8]] = []
         self._gazes: list[NDArray[np.float32]] = []
 
-    def push(self, observation: dict[str, NDArray[Any]], fresh: NDArray[np.bool_]) -> Seen:
+    def push(self, observation: dict[str, NDArray[Any]], fresh: NDArray[np.bool_]) -> PictureHistory:
         """Observations (N, ...) with `obs_state`; fresh: (N,), which are the first of an episode."""
         picture = pooled(observation["picture"].view(np.uint8), self.pool)
         gaze = observation["gaze"].astype(np.float32)
@@ -43,7 +43,7 @@ class History:
         self._gazes = [gaze, *(np.where(moved, gaze, old) for old in self._gazes[: length - 1])]
         motion = [gaze - self._gazes[lag] for lag in (1, *self.lags[1:])]
         state = np.concatenate([*motion, observation["age"].astype(np.float32)], axis=1)
-        return Seen(np.concatenate([self._pictures[lag] for lag in self.lags], axis=1), state)
+        return PictureHistory(np.concatenate([self._pictures[lag] for lag in self.lags], axis=1), state)
 
 
 def pooled(pictures: NDArray[np.uint8], side: int) -> NDArray[np.uint8]:

@@ -24,7 +24,7 @@ from torch.nn.functional import group_norm
 from spikecam_env.untrusted import Declared, Side
 
 
-class Recipe(Declared):
+class PolicyRecipe(Declared):
     """What a network is.
 
     channels  of an observation's picture
@@ -61,7 +61,7 @@ class Policy(nn.Module):
     spread: Tensor
     count: Tensor
 
-    def __init__(self, recipe: Recipe) -> None:
+    def __init__(self, recipe: PolicyRecipe) -> None:
         super().__init__()
         self.recipe, width, maps = recipe, recipe.width, recipe.maps
         states = 2 * len(recipe.lags) + 1

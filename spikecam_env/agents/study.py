@@ -39,7 +39,7 @@ READY = {f"{who}{ending}": sight for who in ("tracker", "shipped") for ending, s
 """Who learns nothing in a study, by what is seen: the classical tracker, and the shipped agent, trained on `tfp`."""
 
 
-class Case(Declared):
+class StudyRun(Declared):
     """A cell and a seed.
 
     task      an id
@@ -63,7 +63,7 @@ class Case(Declared):
     episodes: Count | None = None
 
     @property
-    def cell(self) -> Case:
+    def cell(self) -> StudyRun:
         """Without the seed."""
         return self.model_copy(update={"seed": 0})
 
@@ -98,7 +98,7 @@ class Result(Declared):
     """score: on the test split; cpu_s: of training [s]; curve: as of `training`; along: rows of steps and of the score
     on the first test episodes (`playing.episodes_along`) of the agents on the way."""
 
-    case: Case
+    case: StudyRun
     score: Annotated[float, Field(ge=-100, le=100)]
     cpu_s: Annotated[float, Field(ge=0)] = 0.0
     curve: Annotated[tuple[dict[Name, float], ...], Field(strict=False)] = ()
@@ -120,7 +120,7 @@ def cases(
     trained: tuple[float, float] | None = None,
     shape: tuple[int, int] | None = None,
     imitate: bool = False,
-) -> list[Case]:
+) -> list[StudyRun]:
     """Every cell with every seed, all cells of the first seed first; `intervals` and `trained` are of LowLight."""
     for task in tasks:
         Study(task)  # refuses unknown names
@@ -132,9 +132,9 @@ def cases(
     if trained is not None and trained[0] > trained[1]:
         raise InputError(f"intervals of training are {trained}; give the shortest, then the longest")
     found = [
-        Case(task=task, sight=sight, interval=interval, shape=shape, seed=seed, episodes=episodes)
+        StudyRun(task=task, sight=sight, interval=interval, shape=shape, seed=seed, episodes=episodes)
         if sight in READY
-        else Case(
+        else StudyRun(
             task=task,
             sight=sight,
             interval=interval,
@@ -156,14 +156,14 @@ def cases(
     return found
 
 
-def measure(cases: Sequence[Case], out: Path) -> list[Result]:
+def measure(cases: Sequence[StudyRun], out: Path) -> list[Result]:
     """Of cases with one training: train, unless nothing is to be learned, and play the test episodes of each; out:
     folder in which the run is kept."""
     curve = _curve(cases[0], out)
     return [_played(case, curve, out) for case in cases]
 
 
-def _curve(case: Case, out: Path) -> tuple[dict[str, float], ...]:
+def _curve(case: StudyRun, out: Path) -> tuple[dict[str, float], ...]:
     """Of its training, which is done or gone on with if it is not whole."""
     if case.sight in READY:
         return ()
@@ -171,7 +171,7 @@ def _curve(case: Case, out: Path) -> tuple[dict[str, float], ...]:
     return tuple(train_agent(case.learned, out / case.folder, ppo, case.seed, points=POINTS).training["curve"])
 
 
-def _played(case: Case, curve: tuple[dict[str, float], ...], out: Path) -> Result:
+def _played(case: StudyRun, curve: tuple[dict[str, float], ...], out: Path) -> Result:
     env, episodes = case.played.make(split="test"), case.episodes or episodes_of(case.task)
     try:
         score = score_of(actor_of(case, out, env), env, episodes)
@@ -181,7 +181,7 @@ def _played(case: Case, curve: tuple[dict[str, float], ...], out: Path) -> Resul
     return Result(case=case, score=score, cpu_s=curve[-1]["cpu_s"] if curve else 0.0, curve=curve, along=along)
 
 
-def _along(case: Case, env: gymnasium.Env[Any, Any], episodes: int, out: Path) -> tuple[dict[str, float], ...]:
+def _along(case: StudyRun, env: gymnasium.Env[Any, Any], episodes: int, out: Path) -> tuple[dict[str, float], ...]:
     """Of a case whose agent was trained: the score of the agents on the way."""
     if case.sight in READY:
         return ()
@@ -189,7 +189,7 @@ def _along(case: Case, env: gymnasium.Env[Any, Any], episodes: int, out: Path) -
     return tuple({"steps": steps, "score": score_of(Agent.load(path), env, episodes)} for steps, path in agents.items())
 
 
-def actor_of(case: Case, out: Path, env: gymnasium.Env[Any, Any]) -> Actor:
+def actor_of(case: StudyRun, out: Path, env: gymnasium.Env[Any, Any]) -> Actor:
     """That plays a case: the tracker, the shipped agent, or the one whose training is kept in `out`."""
     inner: Any = env.unwrapped
     if case.sight.startswith("tracker"):
@@ -197,7 +197,7 @@ def actor_of(case: Case, out: Path, env: gymnasium.Env[Any, Any]) -> Actor:
     return Agent.load(case.task if case.sight in READY else out / case.folder / "agent.pt")
 
 
-def study(wanted: Sequence[Case], out: Path, *, jobs: int = 1, ray: str | None = None) -> list[Result]:
+def study(wanted: Sequence[StudyRun], out: Path, *, jobs: int = 1, ray: str | None = None) -> list[Result]:
     """Measure the cases that the record in a folder lacks, and add each to it when it is done.
 
     Args:
@@ -214,7 +214,7 @@ def study(wanted: Sequence[Case], out: Path, *, jobs: int = 1, ray: str | None =
     """
     with run_folder(out, "a study"):
         known = {result.case: result for result in read_record(out / RECORD)}
-        missing: dict[str, list[Case]] = {}
+        missing: dict[str, list[StudyRun]] = {}
         for case in wanted:
             if case not in known:
                 missing.setdefault(case.folder, []).append(case)
@@ -259,13 +259,13 @@ def _done(work: Callable[[T], R], item: T) -> R:
 
 def summary(results: Sequence[Result]) -> list[dict[str, Any]]:
     """A row a cell: mean score, its standard deviation over seeds, how many there are, processor minutes a seed."""
-    cells: dict[Case, list[Result]] = {}
+    cells: dict[StudyRun, list[Result]] = {}
     for result in results:
         cells.setdefault(result.case.cell, []).append(result)
     return [_row(cell, found) for cell, found in cells.items()]
 
 
-def _row(cell: Case, found: list[Result]) -> dict[str, Any]:
+def _row(cell: StudyRun, found: list[Result]) -> dict[str, Any]:
     scores = np.array([result.score for result in found])
     return {
         "task": cell.task,

@@ -20,7 +20,7 @@ from gymnasium.vector import VectorEnv
 
 from denoiser.run import Run
 from spikecam_env.agents.agent import ENDING, Agent
-from spikecam_env.agents.policy import Recipe
+from spikecam_env.agents.policy import PolicyRecipe
 from spikecam_env.agents.ppo import PPO, train
 from spikecam_env.envs.registration import TASK_ENVIRONMENTS, register
 from spikecam_env.envs.tasks import TASKS
@@ -86,7 +86,7 @@ POOL = {"Saccade": 1, "ReadDigit": 1}
 """Pixels squared that are averaged; others 2.  Spokes and strokes are finer than two pixels."""
 
 
-def recipe_of(study: Study, envs: VectorEnv[Any, Any, Any]) -> Recipe:
+def recipe_of(study: Study, envs: VectorEnv[Any, Any, Any]) -> PolicyRecipe:
     """The network for a task.
 
     >>> study = Study("Catch-v1")
@@ -101,7 +101,7 @@ def recipe_of(study: Study, envs: VectorEnv[Any, Any, Any]) -> Recipe:
     picture = spaces["picture"]
     assert isinstance(picture, Box)
     channels, rows, columns = picture.shape
-    return Recipe(
+    return PolicyRecipe(
         channels=channels,
         shape=(rows, columns),
         high=int(picture.high.max()),

@@ -18,7 +18,7 @@ from trimesh.transformations import rotation_matrix
 
 from scenes.renderers.choose import BACKENDS, make, problem
 from scenes.renderers.embree import Embree
-from scenes.renderers.protocol import Lighting, Pinhole, Renderer, Sprite, Surface, Window
+from scenes.renderers.protocol import Lighting, PictureWindow, Pinhole, Renderer, Sprite, Surface
 from scenes.textures import TEXTURES
 from spikecam_env.bench.machine import SHAPE
 
@@ -29,7 +29,7 @@ Objects = list[tuple[Surface, NDArray[np.float64]]]
 
 
 @dataclass(frozen=True)
-class Comparison:
+class RendererComparison:
     """One back-end on this machine.
 
     backend    as `choose_renderer` takes it
@@ -46,7 +46,9 @@ class Comparison:
     to_embree: float
 
 
-def compare_backends(shape: tuple[int, int] = SHAPE, supersample: int = 2, repeats: int = 20) -> list[Comparison]:
+def compare_backends(
+    shape: tuple[int, int] = SHAPE, supersample: int = 2, repeats: int = 20
+) -> list[RendererComparison]:
     """One row for each of `BACKENDS`, each measured in a process of its own, one after the other."""
     truth = [sprite.radiance for sprite in _key(Embree(), shape, EXACT_RAYS)]
     embree = [sprite.radiance for sprite in _key(Embree(), shape, supersample)]
@@ -54,11 +56,11 @@ def compare_backends(shape: tuple[int, int] = SHAPE, supersample: int = 2, repea
     for backend in BACKENDS:
         reason = problem(backend)
         if reason is not None:
-            rows.append(Comparison(backend, reason, np.nan, np.nan, np.nan))
+            rows.append(RendererComparison(backend, reason, np.nan, np.nan, np.nan))
             continue
         with ProcessPoolExecutor(1, get_context("spawn")) as process:
             name, seconds, key = process.submit(_measured, backend, shape, supersample, repeats).result()
-        rows.append(Comparison(backend, name, 1e3 * seconds, _rms(key, truth, truth), _rms(key, embree, truth)))
+        rows.append(RendererComparison(backend, name, 1e3 * seconds, _rms(key, truth, truth), _rms(key, embree, truth)))
     return rows
 
 
@@ -107,7 +109,7 @@ def _key(renderer: Renderer, shape: tuple[int, int], supersample: int, of: Objec
     eye = np.eye(4)
     eye[2, 3] = 3.2
     camera = Pinhole(1.18 * rows, ((columns - 1) / 2, (rows - 1) / 2), eye)
-    window = Window(0, 0, rows, columns)
+    window = PictureWindow(0, 0, rows, columns)
     return [
         renderer.render(surface, pose, camera, Lighting(), window, supersample) for surface, pose in of or objects()
     ]

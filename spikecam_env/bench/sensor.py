@@ -17,17 +17,16 @@ from tqdm import tqdm
 
 from spikecam_env.bench.machine import FRAME_RATE_HZ, SHAPE
 from spikecam_env.sensor import reference
-from spikecam_env.sensor.effects.base import Exposure
+from spikecam_env.sensor.effects.base import ExposureBlock
 from spikecam_env.sensor.kernels import ahead, fast
 from spikecam_env.sensor.light import GRAINS, Keyframes, Segment, ramp, segments
 from spikecam_env.sensor.model import SensorModel, generator
 from spikecam_env.sensor.unit import Unit
-
-Array = NDArray[np.float64]
+from spikecam_env.types import Floats
 
 
 @dataclass(frozen=True)
-class Camera:
+class CameraFormat:
     """shape: (rows, columns).  rate_hz: frames a second."""
 
     shape: tuple[int, int]
@@ -42,11 +41,11 @@ class Camera:
         return self.shape[0] * self.shape[1] * self.rate_hz
 
 
-VIDAR = Camera(SHAPE, FRAME_RATE_HZ)
+VIDAR = CameraFormat(SHAPE, FRAME_RATE_HZ)
 REAL_TIME = VIDAR.real_time
 """Pixel-steps a second of a Vidar camera."""
 
-MEGAPIXEL = Camera((1000, 1000), 20_000)
+MEGAPIXEL = CameraFormat((1000, 1000), 20_000)
 """A spike camera of the next generation: five times the pixel-steps."""
 
 BLOCK = 64
@@ -118,7 +117,7 @@ Contestant = tuple[str, int, int, Sequence[Any], Callable[[Any], object]]
 """Engine, threads, frames in one call, parts of the light, and what takes one of them."""
 
 
-def _contestants(camera: Camera, scene: float | str, seed: int, threads: tuple[int, ...]) -> Iterable[Contestant]:
+def _contestants(camera: CameraFormat, scene: float | str, seed: int, threads: tuple[int, ...]) -> Iterable[Contestant]:
     unit = SensorModel.preset("scsim").draw_unit(camera.shape, seed)
     phase = generator(seed, "phase").random(camera.shape).reshape(-1)
     light = scene_light(scene, camera.shape)
@@ -128,7 +127,7 @@ def _contestants(camera: Camera, scene: float | str, seed: int, threads: tuple[i
     rng = generator(seed, "bench")
     charge = np.floor(phase * GRAINS)
     yield "numpy, exact Poisson", 1, SLOW, few, lambda part: numpy_step(unit, charge, part, rng)
-    first = Exposure(0, float(camera.rate_hz), camera.shape, unit)
+    first = ExposureBlock(0, float(camera.rate_hz), camera.shape, unit)
     state = reference.start(first, (), phase, seed)
     yield "reference", 1, SLOW, few, lambda part: reference.run(first, (), state, part)
     pixels = fast.start(unit, phase, seed)
@@ -149,7 +148,7 @@ def _contestants(camera: Camera, scene: float | str, seed: int, threads: tuple[i
     yield "bytes written, no more", 1, BLOCK, blocks, lambda part: out[: part.count].fill(1)
 
 
-def numpy_step(unit: Unit, charge: Array, segment: Segment, rng: np.random.Generator) -> NDArray[np.uint8]:
+def numpy_step(unit: Unit, charge: Floats, segment: Segment, rng: np.random.Generator) -> NDArray[np.uint8]:
     """The baseline: what one writes first.  Poisson electrons, compare, subtract; a fixed threshold."""
     light = ramp(segment, *unit.grains_per_frame)
     electrons_per_grain = unit.electrons / GRAINS

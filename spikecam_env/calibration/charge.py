@@ -13,11 +13,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from spikecam_env.calibration.jitter import Jitter
-
-Array = NDArray[np.float64]
+from spikecam_env.types import Floats
 
 
 @dataclass(frozen=True)
@@ -45,7 +43,7 @@ def charge_at_one_v_d(jitter: Jitter | None, swing_V: float, reset_noise_mV: flo
 
 
 def charge_at_two_v_d(
-    one: Jitter | None, other: Jitter | None, swing_V: Array, other_swing_V: Array
+    one: Jitter | None, other: Jitter | None, swing_V: Floats, other_swing_V: Floats
 ) -> ChargeScale | None:
     """N of the mean threshold and the reset noise, given each pixel's swing (P,) at both settings [V], NaN if unknown.
 
@@ -72,7 +70,7 @@ def charge_at_two_v_d(
     )
 
 
-def _mean_scales(jitter: Jitter, scale: Array) -> tuple[float, float]:
+def _mean_scales(jitter: Jitter, scale: Floats) -> tuple[float, float]:
     known = np.isfinite(scale)
     weight = jitter.weight[known] / jitter.weight[known].sum()
     return float(weight @ scale[known]), float(weight @ scale[known] ** 2)

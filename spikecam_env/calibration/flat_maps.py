@@ -20,9 +20,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from spikecam_env.errors import InputError
+from spikecam_env.types import Floats
 from spikecam_env.untrusted import numbers, read_arrays
-
-Array = NDArray[np.float64]
 
 FRAMES = 4000
 """R of the module's equations."""
@@ -51,9 +50,9 @@ class FlatMaps:
     counted: where n_dark and n_153 came out whole.  Elsewhere dark is approximate, and dim NaN.
     """
 
-    lit: Array
-    dim: Array
-    dark: Array
+    lit: Floats
+    dim: Floats
+    dark: Floats
     counted: NDArray[np.bool_]
 
 
@@ -79,17 +78,17 @@ def read_flat_maps(path: Path) -> FlatMaps:
     )
 
 
-def counted(rate: Array, seed: int = 0) -> Array:
+def counted(rate: Floats, seed: int = 0) -> Floats:
     """Spikes in FRAMES frames of pixels of this rate and any phase, over FRAMES."""
     return np.floor(FRAMES * rate + np.random.default_rng(seed).random(rate.shape)) / FRAMES
 
 
-def spread_counts(rate: Array, seed: int = 1) -> Array:
+def spread_counts(rate: Floats, seed: int = 1) -> Floats:
     """Counted rates spread evenly within a count, so that quantiles of small counts say something."""
     return rate + (np.random.default_rng(seed).random(rate.shape) - 0.5) / FRAMES
 
 
-def _whole_counts(dark_lux: Array, about: Array) -> tuple[Array, Array, Array]:
+def _whole_counts(dark_lux: Floats, about: Floats) -> tuple[Floats, Floats, Floats]:
     """n_dark near `about` (P,) that makes n_153 the most nearly whole, that n_153, and its distance from whole."""
     reach = np.ceil(_SEARCH * about) + 2
     dark, dim, off = about.copy(), np.zeros(about.size), np.full(about.size, np.inf)

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from spikecam_env.campaign.reading import Campaign
-from spikecam_env.campaign.takes import Take, own_v_d, record_takes
+from spikecam_env.campaign.takes import PlannedRecording, own_v_d, record_takes
 from spikecam_env.errors import InputError
 from spikecam_env.sensor import Keyframes, SensorModel
 
@@ -44,7 +44,9 @@ def write_flats(
     for v_d in voltages:
         at = "" if v_d == voltages[0] else f"-at-{v_d:g}V"
         for i, (level, length) in enumerate(zip(levels, lengths, strict=True)):
-            takes.append(Take(f"{'flat' if level else 'dark'}-{i:02d}{at}", even_light(level), length, v_d=v_d))
+            takes.append(
+                PlannedRecording(f"{'flat' if level else 'dark'}-{i:02d}{at}", even_light(level), length, v_d=v_d)
+            )
     return record_takes(folder, model, takes, shape=shape, seed=seed, engine=engine, progress=progress)
 
 

@@ -21,8 +21,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from spikecam_env.compiled import njit
-
-Array = NDArray[np.float64]
+from spikecam_env.types import Floats
 
 _WEIGHTS = np.asarray(1.0 / (2 * np.pi**2 * np.arange(1, 13) ** 2), np.float64)
 """Of the harmonics of r_k."""
@@ -45,13 +44,13 @@ class Jitter:
     slow: float
     slow_sd: float
     slow_fitted: bool
-    weight: Array
+    weight: Floats
     steps: NDArray[np.int64]
-    by_step: Array
-    by_step_sd: Array
+    by_step: Floats
+    by_step_sd: Floats
 
 
-def second_difference(k: ArrayLike, interval: ArrayLike, white: float, slow: float = 0.0) -> Array:
+def second_difference(k: ArrayLike, interval: ArrayLike, white: float, slow: float = 0.0) -> Floats:
     """A_k of steady pixels; k and interval T [frames] broadcast against each other."""
     steps, t = np.asarray(k), np.asarray(interval, dtype=np.float64)
     return (2 * steps * white + steps**2 * slow) * t**2 + _quantisation(_Read.of(steps, t), white)[0]
@@ -61,15 +60,15 @@ class _Read(NamedTuple):
     """Of intervals of k spikes read in whole frames, whatever their noise: cos(2 pi k T), and 2 pi^2 k T^2, by which
     s^2 makes the first harmonic die."""
 
-    cosine: Array
-    rate: Array
+    cosine: Floats
+    rate: Floats
 
     @classmethod
-    def of(cls, k: NDArray[np.int64], interval: Array) -> _Read:
+    def of(cls, k: NDArray[np.int64], interval: Floats) -> _Read:
         return cls(np.cos(2 * np.pi * (k * interval % 1.0)), 2 * np.pi**2 * k * interval**2)
 
 
-def _quantisation(read: _Read, white: float) -> tuple[Array, Array]:
+def _quantisation(read: _Read, white: float) -> tuple[Floats, Floats]:
     """1/2 - 8 r_k + 2 r_2k, what reading in whole frames adds to A_k, and its derivative in s^2."""
     out = np.empty((2, *read.rate.shape))
     _sum_harmonics(read.cosine.ravel(), read.rate.ravel(), white, _WEIGHTS, *out.reshape(2, -1))
@@ -77,7 +76,9 @@ def _quantisation(read: _Read, white: float) -> tuple[Array, Array]:
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _sum_harmonics(cosines: Array, rates: Array, white: float, weights: Array, values: Array, slopes: Array) -> None:
+def _sum_harmonics(
+    cosines: Floats, rates: Floats, white: float, weights: Floats, values: Floats, slopes: Floats
+) -> None:
     """cos(m x) and exp(-m^2 y) by recurrence over m."""
     for i in range(rates.size):
         first = np.exp(-rates[i] * white)
@@ -96,7 +97,7 @@ def _sum_harmonics(cosines: Array, rates: Array, white: float, weights: Array, v
         values[i], slopes[i] = value, slope * rates[i]
 
 
-def fit_jitter(steps: NDArray[np.int64], square: Array, terms: Array, rate: Array) -> Jitter | None:
+def fit_jitter(steps: NDArray[np.int64], square: Floats, terms: Floats, rate: Floats) -> Jitter | None:
     """Fit s^2 and b to sums of squares (R, P, K) with terms (R, P, K), given rates (R, P) [spikes/frame].
 
     R recordings, P pixels; entries without terms or rate carry no weight.  Weighted moments, iterated; errors from
@@ -117,7 +118,9 @@ def fit_jitter(steps: NDArray[np.int64], square: Array, terms: Array, rate: Arra
     )
 
 
-def _by_step(steps: NDArray[np.int64], square: Array, terms: Array, interval: Array, fit: _Fit) -> tuple[Array, Array]:
+def _by_step(
+    steps: NDArray[np.int64], square: Floats, terms: Floats, interval: Floats, fit: _Fit
+) -> tuple[Floats, Floats]:
     """What each k alone gives for s^2 + k b / 2, and its standard error, (K,)."""
     fraction = _quantisation(_Read.of(steps, interval), fit.white)[0]
     shape = 2 * steps * interval**2
@@ -134,10 +137,10 @@ class _Fit(NamedTuple):
     white_sd: float
     slow: float
     slow_sd: float
-    weight: Array
+    weight: Floats
 
 
-def _fit(steps: NDArray[np.int64], square: Array, terms: Array, interval: Array, *, slow: bool) -> _Fit:
+def _fit(steps: NDArray[np.int64], square: Floats, terms: Floats, interval: Floats, *, slow: bool) -> _Fit:
     """Gauss-Newton on weighted means.
 
     Weights follow the noise, by which steps may turn back by half of the one before, for twenty of them.  From two that

@@ -11,8 +11,7 @@ from numpy.typing import NDArray
 from spikecam_env.robust import UPPER
 from spikecam_env.sensor import CATALOGUE, Circuit, Effect, SensorModel
 from spikecam_env.sensor.effects.base import build
-
-Array = NDArray[np.float64]
+from spikecam_env.types import Floats
 
 FLAGS = {
     "unidentified": 1,
@@ -28,7 +27,9 @@ _HOT_SIGMAS = 5.0
 _MISFIT_P = 1e-7
 
 
-def pixel_flags(gain: Array, dark: Array, chi2: Array, freedom: NDArray[np.int64], excess: float) -> NDArray[np.uint8]:
+def pixel_flags(
+    gain: Floats, dark: Floats, chi2: Floats, freedom: NDArray[np.int64], excess: float
+) -> NDArray[np.uint8]:
     """uint8 bits of FLAGS, of the arrays' shape; chi2 is reduced, excess: pooled chi2."""
     flags = np.zeros(gain.shape, dtype=np.uint8)
     unknown = ~np.isfinite(gain)
@@ -42,7 +43,7 @@ def pixel_flags(gain: Array, dark: Array, chi2: Array, freedom: NDArray[np.int64
     return flags
 
 
-def hot_limit(dark: Array) -> float:
+def hot_limit(dark: Floats) -> float:
     """Dark level above which a pixel is hot: five standard deviations of ln(dark), taken from its upper middle."""
     low, high = np.quantile(dark, [0.5, UPPER])
     low = max(low, 1e-12)
@@ -58,7 +59,7 @@ class DarkLaw:
     second: float
 
 
-def dark_law(dark: Array) -> DarkLaw:
+def dark_law(dark: Floats) -> DarkLaw:
     """Normal or log-normal, whichever is the likelier for these pixels (hot ones left out)."""
     mean, sd = float(dark.mean()), float(dark.std())
     if sd <= 0 or dark.min() <= 0:
@@ -71,7 +72,7 @@ def dark_law(dark: Array) -> DarkLaw:
     return DarkLaw("normal", mean, sd)
 
 
-def spread(values: Array, sd: Array) -> float:
+def spread(values: Floats, sd: Floats) -> float:
     """Standard deviation over mean, less what the measurement's own errors add."""
     return float(np.sqrt(max(values.var() - np.mean(sd**2), 0.0)) / values.mean())
 
@@ -81,14 +82,14 @@ def fitted_model(
     circuit: Circuit,
     frame_rate_hz: float,
     *,
-    gain: Array,
-    gain_sd: Array,
-    dark: Array,
+    gain: Floats,
+    gain_sd: Floats,
+    dark: Floats,
     flags: NDArray[np.uint8],
     electrons: float,
     reset_noise_mV: float,
-    swing_V: Array | None,
-    swing_sd_V: Array | None = None,
+    swing_V: Floats | None,
+    swing_sd_V: Floats | None = None,
 ) -> SensorModel:
     """A model with the spreads of these maps; gain relative to its mean, dark [thresholds/frame] as current.
 
@@ -119,7 +120,7 @@ def fitted_model(
     return SensorModel(name, circuit, frame_rate_hz, tuple(effects))
 
 
-def flattened(gain: Array, good: NDArray[np.bool_]) -> tuple[Array, float]:
+def flattened(gain: Floats, good: NDArray[np.bool_]) -> tuple[Floats, float]:
     """The map (H, W) without a bowl about its middle, 1 - v r^2 / r_corner^2, and v; 0 if not five standard errors."""
     rows, columns = gain.shape
     y, x = np.mgrid[:rows, :columns]
@@ -135,7 +136,7 @@ def flattened(gain: Array, good: NDArray[np.bool_]) -> tuple[Array, float]:
     return gain / (1 - falloff * square), falloff
 
 
-def dark_effects(current_pA: Array, hot: NDArray[np.bool_]) -> list[Effect]:
+def dark_effects(current_pA: Floats, hot: NDArray[np.bool_]) -> list[Effect]:
     """Effects whose dark current is distributed as these pixels' (P,); hot ones are a population of their own."""
     law = dark_law(current_pA[~hot])
     effects = [_effect("dark_current", mean_pA=law.first)]

@@ -20,9 +20,8 @@ from spikecam_env.calibration.spike_times import SpikeTimes, spike_times
 from spikecam_env.compiled import njit
 from spikecam_env.errors import InputError
 from spikecam_env.streams import pack_frames
+from spikecam_env.types import Floats
 from spikecam_env.untrusted import read_arrays
-
-Array = NDArray[np.float64]
 
 WALL = (slice(110, 200), slice(15, 355))
 """Rows and columns of bare wall."""
@@ -50,7 +49,7 @@ def read_spikes(folder: str | Path) -> NDArray[np.uint8]:
     return np.moveaxis(spikes, 2, 0)
 
 
-def read_response_and_dark(folder: str | Path) -> tuple[Array, Array]:
+def read_response_and_dark(folder: str | Path) -> tuple[Floats, Floats]:
     """(H, W) rates at 335 lux less the dark's, and in the dark [spikes/frame], of the flat maps."""
     maps = read_flat_maps(Path(folder) / MAPS)
     return maps.lit - maps.dark, maps.dark
@@ -66,10 +65,10 @@ class WallStatistics:
     """
 
     times: SpikeTimes
-    rate: Array
-    excess: Array
-    excess_sd: Array
-    minimum_range: Array
+    rate: Floats
+    excess: Floats
+    excess_sd: Floats
+    minimum_range: Floats
     variance_excess: float
     variance_excess_sd: float
 
@@ -96,7 +95,7 @@ def wall_statistics(spikes: NDArray[np.uint8]) -> WallStatistics:
     )
 
 
-def plausible_rates(times: SpikeTimes, white: float, rng: np.random.Generator) -> Array:
+def plausible_rates(times: SpikeTimes, white: float, rng: np.random.Generator) -> Floats:
     """(P,) rates drawn from what each pixel's first and last spike leave open, under jitter s^2 = white.
 
     Measured rates crowd at simple fractions: a pixel of interval 5.004 shows one of 5 for a hundred spikes.  A camera
@@ -112,13 +111,13 @@ def plausible_rates(times: SpikeTimes, white: float, rng: np.random.Generator) -
     return np.asarray(n / np.maximum(end - begin + walk, least))
 
 
-def ideal_second_difference(k: NDArray[np.int64], interval: Array) -> Array:
+def ideal_second_difference(k: NDArray[np.int64], interval: Floats) -> Floats:
     """A_k of a noise-free pixel of interval T, phase uniform: 2 min(x, 1 - x), x the fractional part of kT."""
     x = np.mod(k * interval, 1.0)
     return 2.0 * np.minimum(x, 1.0 - x)
 
 
-def _variance_above_floor(spikes: NDArray[np.uint8]) -> Array:
+def _variance_above_floor(spikes: NDArray[np.uint8]) -> Floats:
     """(P,) interval variance less f(1-f), f the fractional part of the pixel's mean interval."""
     count = spikes.sum(axis=0, dtype=np.int64)
     frames, pixel = np.nonzero(spikes.T)[::-1]
@@ -132,7 +131,7 @@ def _variance_above_floor(spikes: NDArray[np.uint8]) -> Array:
 
 
 @njit(cache=True)
-def _minimum_ranges(spikes: NDArray[np.uint8]) -> Array:
+def _minimum_ranges(spikes: NDArray[np.uint8]) -> Floats:
     """(P,) of (P, T): min over a of max(N - a t) - min(N - a t), t at the ends of frames, by golden section."""
     out = np.empty(spikes.shape[0])
     frames = spikes.shape[1]
@@ -155,7 +154,7 @@ def _minimum_ranges(spikes: NDArray[np.uint8]) -> Array:
 
 
 @njit(inline="always")
-def _range(counted: Array, slope: float) -> float:
+def _range(counted: Floats, slope: float) -> float:
     low, high = np.inf, -np.inf
     for t in range(counted.size):
         value = counted[t] - slope * t

@@ -19,8 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from spikecam_env.calibration.spike_times import SpikeTimes
-
-Array = NDArray[np.float64]
+from spikecam_env.types import Floats
 
 SATURATION = 0.97
 """Rate above which a recording of a pixel is left out: jitter makes some intervals shorter than a frame: lost."""
@@ -39,15 +38,15 @@ class Rates:
     saturated: bool, fires in (nearly) every frame.
     """
 
-    rate: Array
-    intervals: Array
-    ends: Array
-    limit: Array
-    frames: Array
+    rate: Floats
+    intervals: Floats
+    ends: Floats
+    limit: Floats
+    frames: Floats
     counted: NDArray[np.bool_]
     saturated: NDArray[np.bool_]
 
-    def variance(self, expected: Array, white: float) -> Array:
+    def variance(self, expected: Floats, white: float) -> Floats:
         """(R, P) variance of the rates, were `expected` the true ones; white: s^2."""
         r = np.maximum(expected, 1e-9)
         n = np.maximum(self.intervals, 1.0)
@@ -80,8 +79,8 @@ def rates_from_times(times: list[SpikeTimes]) -> Rates:
 
 
 def _rate_between_ends(
-    count: NDArray[np.int64], first: NDArray[np.int64], last: NDArray[np.int64], frames: Array
-) -> tuple[Array, Array]:
+    count: NDArray[np.int64], first: NDArray[np.int64], last: NDArray[np.int64], frames: Floats
+) -> tuple[Floats, Floats]:
     """(R, P) rates, and variances of the spans that they are over [frames^2]."""
     intervals = np.maximum(count - 1, 1)
     span = np.maximum(last - first, 1).astype(np.float64)
@@ -89,17 +88,17 @@ def _rate_between_ends(
         begin, begin_variance = _within_frame(first, span / intervals)
         end, end_variance = _within_frame(frames - 1 - last, span / intervals)
         span = np.where(count > 1, frames - end - begin, 1.0)
-    rate: Array = intervals / span
+    rate: Floats = intervals / span
     return rate, begin_variance + end_variance
 
 
-def _within_frame(frame: Array | NDArray[np.int64], interval: Array) -> tuple[Array, Array]:
+def _within_frame(frame: Floats | NDArray[np.int64], interval: Floats) -> tuple[Floats, Floats]:
     """Mean and variance of a time known to lie in its frame, and within one interval of zero."""
     width = np.clip(interval - frame, 0.0, 1.0)
     return frame + width / 2, width**2 / 12
 
 
-def rates_from_counts(rate: Array, frames: float) -> Rates:
+def rates_from_counts(rate: Floats, frames: float) -> Rates:
     """One recording (1, P) of rates only: counts to the ends of it, variance 1/6 and the walk."""
     return Rates(
         rate[None],
@@ -131,18 +130,18 @@ class Lines:
     line was drawn through it; NaN where not used or exact.
     """
 
-    gain: Array
-    dark: Array
-    var_gain: Array
-    var_dark: Array
-    covariance: Array
-    chi2: Array
+    gain: Floats
+    dark: Floats
+    var_gain: Floats
+    var_dark: Floats
+    covariance: Floats
+    chi2: Floats
     freedom: NDArray[np.int64]
     used: NDArray[np.int64]
-    residual: Array
+    residual: Floats
 
 
-def fit_lines(light: Array, rates: Rates, white: float, use: NDArray[np.bool_] | None = None) -> Lines:
+def fit_lines(light: Floats, rates: Rates, white: float, use: NDArray[np.bool_] | None = None) -> Lines:
     """Weighted least squares for every pixel; weights from fitted, not measured, rates.
 
     light: (R, P) radiance.  white: s^2.  use: (R,) recordings to fit; the rest only get residuals.
@@ -174,7 +173,9 @@ def fit_lines(light: Array, rates: Rates, white: float, use: NDArray[np.bool_] |
     return Lines(gain, dark, sw / divisor, sll / divisor, -sl / divisor, chi2, freedom, fitted.sum(0), residual)
 
 
-def best_possible(gain: Array, dark: Array, light: Array, frames: Array, white: float | Array) -> tuple[Array, Array]:
+def best_possible(
+    gain: Floats, dark: Floats, light: Floats, frames: Floats, white: float | Floats
+) -> tuple[Floats, Floats]:
     """(P,) smallest standard deviations of gain and dark that any estimator can have (Cramer-Rao; docs/calibration.md).
 
     From crossings seen exactly, levels below one spike a frame; light: (R, P), frames: (R,), white: s^2 or (P,) of it.

@@ -35,8 +35,7 @@ from spikecam_env.checked import checked_number
 from spikecam_env.errors import InputError
 from spikecam_env.sensor import Circuit
 from spikecam_env.sensor.unit import MOST_KAPPA, SWING_V
-
-Array = NDArray[np.float64]
+from spikecam_env.types import Floats
 
 SAME_V_D_V = 1e-6
 """Distance up to which two V_d are one [V]: far below what a supply sets, far above the rounding of labels."""
@@ -72,19 +71,19 @@ class Setting:
 
     v_d: float | None
     levels: tuple[Level, ...]
-    gain: Array
-    gain_sd: Array
-    dark: Array
-    dark_sd: Array
-    covariance: Array
-    chi2: Array
+    gain: Floats
+    gain_sd: Floats
+    dark: Floats
+    dark_sd: Floats
+    covariance: Floats
+    chi2: Floats
     used: NDArray[np.int64]
     excess: float
     flags: NDArray[np.uint8]
     jitter: Jitter | None
-    light: Array
-    rate: Array
-    residual: Array
+    light: Floats
+    rate: Floats
+    residual: Floats
 
 
 @dataclass(frozen=True)
@@ -107,8 +106,8 @@ class Calibration:
     settings: tuple[Setting, ...]
     flags: NDArray[np.uint8]
     charge: ChargeScale | None
-    swing_V: Array | None
-    swing_sd_V: Array | None
+    swing_V: Floats | None
+    swing_sd_V: Floats | None
     circuit: Circuit
     warnings: tuple[str, ...]
 
@@ -185,7 +184,7 @@ def calibrate(
     )
 
 
-def _are_swings(swing_V: Array) -> bool:
+def _are_swings(swing_V: Floats) -> bool:
     """Whether the mean of the pixels that are known, of which there are some, is a swing that a circuit can have."""
     return bool(SWING_V[0] <= np.nanmean(swing_V) <= SWING_V[1])
 
@@ -197,7 +196,7 @@ def _check_regular(flags: NDArray[np.uint8]) -> None:
     raise InputError(f"no pixel is regular ({counts} of {flags.size}): nothing can be said of this camera; record anew")
 
 
-def swing_from_two_v_d(one: Setting, other: Setting) -> tuple[Array, Array]:
+def swing_from_two_v_d(one: Setting, other: Setting) -> tuple[Floats, Floats]:
     """(H, W) swing V_d + V_S at the first setting and its standard deviation [V]; NaN for pixels without a slope.
 
     The same light and charge over another threshold: gain_1 / gain_2 = (V_2 + V_S) / (V_1 + V_S) = q, so
@@ -211,9 +210,9 @@ def swing_from_two_v_d(one: Setting, other: Setting) -> tuple[Array, Array]:
     return difference / (1 - q), np.abs(difference) / (1 - q) ** 2 * sd_q
 
 
-def _by_v_d(campaign: Campaign, warnings: list[str]) -> dict[float | None, list[tuple[CampaignRecording, Array]]]:
+def _by_v_d(campaign: Campaign, warnings: list[str]) -> dict[float | None, list[tuple[CampaignRecording, Floats]]]:
     """Static recordings of known light, by V_d."""
-    groups: dict[float | None, list[tuple[CampaignRecording, Array]]] = {}
+    groups: dict[float | None, list[tuple[CampaignRecording, Floats]]] = {}
     for recording in campaign.recordings:
         light = recording.static_radiance()
         if light is None:
@@ -235,7 +234,7 @@ def _alike(known: Iterable[float | None], v_d: float | None) -> float | None:
 
 def _fit_setting(
     v_d: float | None,
-    recordings: list[tuple[CampaignRecording, Array]],
+    recordings: list[tuple[CampaignRecording, Floats]],
     campaign: Campaign,
     warnings: list[str],
     progress: bool,
@@ -298,7 +297,7 @@ def _fit_setting(
     )
 
 
-def _check_levels(light: Array, v_d: float | None) -> None:
+def _check_levels(light: Floats, v_d: float | None) -> None:
     at = _at(v_d)
     if light.size == 0 or light.max() <= 0:
         raise InputError(f"all fit recordings{at} are dark: the response to light cannot be identified; add a lit flat")
@@ -314,7 +313,7 @@ def _at(v_d: float | None) -> str:
 
 
 def _check_order(
-    recordings: list[tuple[CampaignRecording, Array]], light: Array, rates: Rates, use: NDArray[np.bool_]
+    recordings: list[tuple[CampaignRecording, Floats]], light: Floats, rates: Rates, use: NDArray[np.bool_]
 ) -> None:
     """More light, more spikes: raises InputError where medians over pixels say otherwise by more than 1 %."""
     label, rate = np.median(light, axis=1), np.nanmedian(rates.rate, axis=1)
@@ -357,8 +356,8 @@ def _pooled_excess(lines: Lines) -> float:
 
 
 def _levels(
-    recordings: list[tuple[CampaignRecording, Array]],
-    light: Array,
+    recordings: list[tuple[CampaignRecording, Floats]],
+    light: Floats,
     rates: Rates,
     lines: Lines,
     regular: NDArray[np.bool_],

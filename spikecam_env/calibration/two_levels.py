@@ -11,12 +11,10 @@ from dataclasses import dataclass
 
 import numpy as np
 import scipy
-from numpy.typing import NDArray
 
 from spikecam_env.calibration.flat_maps import DIM_LUX, FRAMES, LUX, FlatMaps
 from spikecam_env.robust import scatter
-
-Array = NDArray[np.float64]
+from spikecam_env.types import Floats
 
 _SMOOTH = 12.0
 """Standard deviation of the window that separates shading from pixels [pixels]."""
@@ -93,16 +91,16 @@ def two_levels(maps: FlatMaps) -> TwoLevels:
     )
 
 
-def response_and_dark(response: Array, dark: Array) -> float:
+def response_and_dark(response: Floats, dark: Floats) -> float:
     """Correlation over pixels of response and ln(dark), shading included; a dark count of 0 is taken for half a one."""
     return _correlation(response.ravel(), np.log(np.maximum(dark, 0.5 / FRAMES)).ravel())
 
 
-def _correlation(a: Array, b: Array) -> float:
+def _correlation(a: Floats, b: Floats) -> float:
     return float(np.corrcoef(a, b)[0, 1])
 
 
-def split_shading(light: Array) -> tuple[Array, float]:
+def split_shading(light: Floats) -> tuple[Floats, float]:
     """The smooth part (H, W) of a response map, and the pixels' relative spread around it (robust: dust, edges)."""
     smooth = scipy.ndimage.gaussian_filter(scipy.ndimage.median_filter(light, 5), _SMOOTH, mode="nearest")
     rest = light / smooth - 1.0

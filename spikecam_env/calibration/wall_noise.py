@@ -25,8 +25,7 @@ from spikecam_env.calibration.real import (
     plausible_rates,
     wall_statistics,
 )
-
-Array = NDArray[np.float64]
+from spikecam_env.types import Floats
 
 OCTAVES = 12
 
@@ -84,7 +83,7 @@ def fit_wall_noise(wall: WallStatistics, *, progress: bool = False) -> WallNoise
     )
 
 
-def excess_covariance(wall: WallStatistics) -> Array:
+def excess_covariance(wall: WallStatistics) -> Floats:
     """(40, 40) covariance of the excess, from independent pixels."""
     ideal = ideal_second_difference(np.array(STEPS), 1.0 / wall.rate[:, None])
     influence = wall.times.square - wall.times.terms * (ideal + wall.excess)
@@ -92,7 +91,9 @@ def excess_covariance(wall: WallStatistics) -> Array:
     return np.asarray(influence.T @ influence)
 
 
-def simulate_wall(rate: Array, white: float, octave: float, frames: int, rng: np.random.Generator) -> NDArray[np.uint8]:
+def simulate_wall(
+    rate: Floats, white: float, octave: float, frames: int, rng: np.random.Generator
+) -> NDArray[np.uint8]:
     """(frames, 1, P) spikes of pixels at these rates under this noise, phases uniform."""
     interval = 1.0 / rate
     # A number of cycles that no small change of rate moves, so that draws stay common.
@@ -112,7 +113,7 @@ def simulate_wall(rate: Array, white: float, octave: float, frames: int, rng: np
     return spikes
 
 
-def _simulated_excess(wall: WallStatistics, values: Array, bar: tqdm) -> Array:
+def _simulated_excess(wall: WallStatistics, values: Floats, bar: tqdm) -> Floats:
     runs = []
     for seed in range(_SEEDS):
         rng = np.random.default_rng(seed)

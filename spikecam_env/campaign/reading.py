@@ -56,7 +56,8 @@ class CampaignRecording:
 
     >>> from spikecam_env.sensor import Keyframes, SensorModel
     >>> light = Keyframes(np.array([0.0]), np.full((1, 1, 1), 0.25, np.float32))
-    >>> campaign = record_takes("camera", SensorModel.preset("ideal"), [Take("flat", light, 80)], shape=(2, 4))
+    >>> flats = [PlannedRecording("flat", light, 80)]
+    >>> campaign = record_takes("camera", SensorModel.preset("ideal"), flats, shape=(2, 4))
     >>> flat = campaign.recordings[0]
     >>> float(flat.load().mean()), float(flat.static_radiance().mean())
     (0.25, 0.25)
@@ -121,7 +122,8 @@ class Campaign:
 
     >>> from spikecam_env.sensor import Keyframes, SensorModel
     >>> light = Keyframes(np.array([0.0]), np.full((1, 1, 1), 0.25, np.float32))
-    >>> campaign = record_takes("camera", SensorModel.preset("ideal"), [Take("flat", light, 80)], shape=(2, 4))
+    >>> flats = [PlannedRecording("flat", light, 80)]
+    >>> campaign = record_takes("camera", SensorModel.preset("ideal"), flats, shape=(2, 4))
     >>> campaign.shape, [recording.name for recording in campaign.recordings]
     ((2, 4), ['flat'])
     """
@@ -166,7 +168,8 @@ def read_campaign(folder: str | Path, *, outside: bool = False) -> Campaign:
 
     >>> from spikecam_env.sensor import Keyframes, SensorModel
     >>> light = Keyframes(np.array([0.0]), np.full((1, 1, 1), 0.25, np.float32))
-    >>> recorded = record_takes("camera", SensorModel.preset("ideal"), [Take("flat", light, 80)], shape=(2, 4))
+    >>> flats = [PlannedRecording("flat", light, 80)]
+    >>> recorded = record_takes("camera", SensorModel.preset("ideal"), flats, shape=(2, 4))
     >>> read_campaign("camera") == recorded
     True
     """

@@ -26,6 +26,7 @@ from spikecam_env.campaign.writing import finish_campaign, save_light, save_spik
 from spikecam_env.checked import checked_count, checked_seed, checked_shape
 from spikecam_env.errors import InputError, unknown_name
 from spikecam_env.names import distinct, file_name
+from spikecam_env.renamed import old_names
 from spikecam_env.run_folder import run_folder
 from spikecam_env.sensor import Keyframes, SensorModel, SpikeSensor
 from spikecam_env.streams.packing import packed_bytes
@@ -40,7 +41,7 @@ _BLOCK = 2_000_000
 
 
 @dataclass(frozen=True)
-class Take:
+class PlannedRecording:
     """One recording to be made.
 
     name: of its files.  light: keys whose radiance is (K, H, W) or broadcasts to it.  use: fit or holdout.
@@ -48,7 +49,7 @@ class Take:
     model's own v_d fire once a frame.
 
     >>> from spikecam_env.sensor import Keyframes
-    >>> flat = Take("flat", Keyframes(np.array([0.0]), np.full((1, 1, 1), 0.25, np.float32)), frames=80)
+    >>> flat = PlannedRecording("flat", Keyframes(np.array([0.0]), np.full((1, 1, 1), 0.25, np.float32)), frames=80)
     >>> flat.use, flat.frames
     ('fit', 80)
     """
@@ -64,7 +65,7 @@ class Take:
 def record_takes(
     folder: str | Path,
     model: SensorModel,
-    takes: Sequence[Take],
+    takes: Sequence[PlannedRecording],
     *,
     shape: tuple[int, int],
     seed: int = 0,
@@ -80,7 +81,8 @@ def record_takes(
 
     >>> from spikecam_env.sensor import Keyframes, SensorModel
     >>> light = Keyframes(np.array([0.0]), np.full((1, 1, 1), 0.25, np.float32))
-    >>> campaign = record_takes("camera", SensorModel.preset("ideal"), [Take("flat", light, 80)], shape=(2, 4))
+    >>> flats = [PlannedRecording("flat", light, 80)]
+    >>> campaign = record_takes("camera", SensorModel.preset("ideal"), flats, shape=(2, 4))
     >>> int(campaign.recordings[0].load().sum())
     160
     """
@@ -145,7 +147,7 @@ def light_during(light: Keyframes, start: int, stop: int, shape: tuple[int, int]
     return Keyframes(light.frame[first : last + 1], np.broadcast_to(radiance, (len(radiance), *shape)))
 
 
-def _stream(sensor: SpikeSensor, take: Take, scale: float, bar: tqdm) -> Iterator[NDArray[np.uint8]]:
+def _stream(sensor: SpikeSensor, take: PlannedRecording, scale: float, bar: tqdm) -> Iterator[NDArray[np.uint8]]:
     block = max(64, _BLOCK // (sensor.shape[0] * sensor.shape[1]) // 64 * 64)
     for start in range(0, take.frames, block):
         count = min(block, take.frames - start)
@@ -162,7 +164,7 @@ def _light_scale(model: SensorModel, camera: SensorModel) -> float:
     return model.circuit.swing_V / camera.circuit.swing_V
 
 
-def _entry(take: Take, model: SensorModel) -> dict[str, Any]:
+def _entry(take: PlannedRecording, model: SensorModel) -> dict[str, Any]:
     return {
         "name": take.name,
         "spikes": f"{take.name}.dat",
@@ -175,7 +177,7 @@ def _entry(take: Take, model: SensorModel) -> dict[str, Any]:
     }
 
 
-def _check(takes: Sequence[Take], shape: tuple[int, int]) -> None:
+def _check(takes: Sequence[PlannedRecording], shape: tuple[int, int]) -> None:
     if not takes:
         raise InputError("a campaign needs at least one recording; give some")
     distinct((file_name(take.name, "recording name") for take in takes), "recording")
@@ -191,7 +193,7 @@ def _check(takes: Sequence[Take], shape: tuple[int, int]) -> None:
             )
 
 
-def _plan(takes: Sequence[Take], shape: tuple[int, int], seed: int, engine: str) -> dict[str, Any]:
+def _plan(takes: Sequence[PlannedRecording], shape: tuple[int, int], seed: int, engine: str) -> dict[str, Any]:
     """All that the bytes depend on besides the model, as JSON has it."""
     described = [
         {"name": t.name, "frames": t.frames, "use": t.use, "v_d": t.v_d, "note": t.note, "light": _digest(t.light)}
@@ -232,3 +234,6 @@ def _same_simulation(target: Path, model: SensorModel, plan: dict[str, Any]) -> 
         return bool(found == plan and SensorModel.from_toml(target / "model.toml") == model)
     except InputError:
         return False
+
+
+__getattr__ = old_names(__name__, {"Take": "PlannedRecording"})

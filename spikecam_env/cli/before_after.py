@@ -9,14 +9,11 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
 from denoiser.metrics import psnr_db
-from spikecam_env.cli.panels import Panel
+from spikecam_env.cli.panels import PicturePanel
 from spikecam_env.streams import middleTFP
-
-Spikes = NDArray[np.uint8]
-Picture = NDArray[np.float32]
+from spikecam_env.types import Pictures, Spikes
 
 WINDOW = 41
 """Frames of a mean (TFP): the width of the denoiser's own window in the paper."""
@@ -24,12 +21,12 @@ WHITE = 99.8
 """Percentile of light that is shown white: the few pixels above it are highlights."""
 
 
-def white_of(pictures: Picture | Sequence[Picture]) -> float:
+def white_of(pictures: Pictures | Sequence[Pictures]) -> float:
     """The light that is shown white, in the unit of the pictures; 1 where they are all dark."""
     return float(np.percentile(pictures, WHITE)) or 1.0
 
 
-def mean_panel(title: str, spikes: Spikes, frame: int, window: int, light: Picture | None = None) -> Panel:
+def mean_panel(title: str, spikes: Spikes, frame: int, window: int, light: Pictures | None = None) -> PicturePanel:
     """A panel of the mean over the window about a frame.
 
     Args:
@@ -40,17 +37,17 @@ def mean_panel(title: str, spikes: Spikes, frame: int, window: int, light: Pictu
         light: (H, W) true light at the frame, where it is known.
     """
     picture = middleTFP(spikes, frame, window)
-    return Panel(picture, title, _line(over(window), picture, light))
+    return PicturePanel(picture, title, _line(over(window), picture, light))
 
 
-def instant_panel(title: str, picture: Picture, light: Picture | None = None) -> Panel:
+def instant_panel(title: str, picture: Pictures, light: Pictures | None = None) -> PicturePanel:
     """A panel of one frame's picture (H, W); light: true light at the frame, where it is known."""
-    return Panel(picture, title, _line(over(1), picture, light))
+    return PicturePanel(picture, title, _line(over(1), picture, light))
 
 
-def light_panel(light: Picture, frame: int, frame_rate_hz: float | None) -> Panel:
+def light_panel(light: Pictures, frame: int, frame_rate_hz: float | None) -> PicturePanel:
     """A panel of the true light (H, W) in the middle of a frame."""
-    return Panel(light, "true light", instant(frame, frame_rate_hz))
+    return PicturePanel(light, "true light", instant(frame, frame_rate_hz))
 
 
 def over(window: int) -> str:
@@ -71,10 +68,10 @@ def instant(frame: int, frame_rate_hz: float | None) -> str:
     return f"frame {frame}" + ("" if frame_rate_hz is None else f", {1e3 * (frame + 0.5) / frame_rate_hz:.2f} ms")
 
 
-def light_db(picture: Picture, light: Picture) -> float:
+def light_db(picture: Pictures, light: Pictures) -> float:
     """PSNR [dB] of a picture against the true light (H, W), whose brightest pixel is the peak."""
     return psnr_db(picture, light, float(light.max()) or 1.0)
 
 
-def _line(what: str, picture: Picture, light: Picture | None) -> str:
+def _line(what: str, picture: Pictures, light: Pictures | None) -> str:
     return what if light is None else f"{what}, PSNR {light_db(picture, light):.2f} dB"

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True)
-class Camera:
+class CameraOptions:
     """The camera's model."""
 
     model: str = "scsim"

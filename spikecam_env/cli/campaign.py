@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING, Annotated
 
 import tyro
 
-from spikecam_env.cli.camera import Camera
+from spikecam_env.cli.camera import CameraOptions
 from spikecam_env.cli.options import Count, Positive, Seed, Size, Whole
-from spikecam_env.cli.reading import Reading
+from spikecam_env.cli.reading import ReadingOptions
 
 if TYPE_CHECKING:
     from spikecam_env.campaign import Campaign
@@ -27,7 +27,7 @@ class Simulate:
 
     out: tyro.conf.Positional[Path]
     """Folder for the campaign."""
-    camera: Camera = field(default_factory=Camera)
+    camera: CameraOptions = field(default_factory=CameraOptions)
     shape: Size = (64, 64)
     """Rows and columns."""
     frames: Count = 8000
@@ -91,7 +91,7 @@ class Import:
     """Share of each recording, at its end, to hold out for judging the result."""
     radiance_per_unit: Positive = 1.0
     """Radiance of a label of 1, for labels in lux or another unit."""
-    reading: Reading = field(default_factory=Reading)
+    reading: ReadingOptions = field(default_factory=ReadingOptions)
     outside: bool = False
     """Also read labelled files that lie outside the folder."""
 

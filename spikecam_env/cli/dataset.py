@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import tyro
 
-from spikecam_env.cli.camera import Camera
+from spikecam_env.cli.camera import CameraOptions
 from spikecam_env.cli.options import Count, Seed, Size, Whole, Workers
 
 if TYPE_CHECKING:
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 
 @dataclass
-class Making:
+class DatasetOptions:
     """What every dataset has."""
 
     out: Path
@@ -33,7 +33,7 @@ class Making:
     """Exposure: frames between spikes, on average over the picture."""
     renderer: Literal["auto", "egl-hardware", "egl-software", "osmesa", "embree"] = "auto"
     """Back-end that draws; auto: the best that works here, and the same one when a run is continued."""
-    camera: Camera = field(default_factory=Camera)
+    camera: CameraOptions = field(default_factory=CameraOptions)
     jobs: Workers = 1
     """Worker processes on this machine, or workers of a local Ray cluster."""
     ray: Annotated[str | None, tyro.conf.arg(metavar="ADDRESS")] = None
@@ -64,7 +64,7 @@ class Making:
 
 
 @dataclass
-class SpiftN(Making):
+class SpiftN(DatasetOptions):
     """Random scenes: 100 to train on and 10 to test, as in the paper, each with a camera of its own.
 
     example:  spikecam dataset spift-n --out spift --jobs 2
@@ -82,7 +82,7 @@ class SpiftN(Making):
 
 
 @dataclass
-class PhmN(Making):
+class PhmN(DatasetOptions):
     """The ten well-designed scenes: ball, cook, dice, doll, fan, fly, hand, jump, poker, top.
 
     example:  spikecam dataset phm-n --out phm --jobs 2

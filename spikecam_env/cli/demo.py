@@ -6,7 +6,7 @@ from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from spikecam_env.cli.camera import Camera
+from spikecam_env.cli.camera import CameraOptions
 from spikecam_env.cli.mode_weights import Mode
 from spikecam_env.cli.options import Count, Rpm, Seed, Size
 
@@ -39,7 +39,7 @@ class Demo:
     """Spike frames to stream; default 1200, one turn at 2000 rpm; with --quick 250."""
     mode: Mode = "best"
     """Which DnSS denoises the film."""
-    camera: Camera = field(default_factory=Camera)
+    camera: CameraOptions = field(default_factory=CameraOptions)
     size: Size = (250, 400)
     """Rows and columns."""
     seed: Seed = 0

@@ -10,7 +10,7 @@ import tyro
 
 from spikecam_env.cli.mode_weights import Mode
 from spikecam_env.cli.options import Count
-from spikecam_env.cli.reading import Reading
+from spikecam_env.cli.reading import ReadingOptions
 
 if TYPE_CHECKING:
     import numpy as np
@@ -47,7 +47,7 @@ class Denoise:
     """Not for `paper`: maps.h5 of `spikecam calibrate`, or its folder: the camera's fixed pattern is then taken out."""
     film: bool = True
     """Also write film.mp4, noisy beside denoised: at most 240 pictures, evenly over the recording."""
-    reading: Reading = field(default_factory=Reading)
+    reading: ReadingOptions = field(default_factory=ReadingOptions)
 
     def run(self) -> None:
         from spikecam_env.cli.files import out_folder, write_json

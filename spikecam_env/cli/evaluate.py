@@ -14,7 +14,7 @@ from spikecam_env.cli.evaluate_agents import Agents
 from spikecam_env.cli.evaluate_spikezoo import SpikeZoo
 from spikecam_env.cli.evaluate_tables import StillScenes, Table1, Table2, Table3, Table4
 from spikecam_env.cli.evaluate_tasks import Tasks
-from spikecam_env.cli.evaluate_truth import Truth
+from spikecam_env.cli.evaluate_truth import EvaluateTruth
 from spikecam_env.cli.mode_weights import Mode, ModeWeights
 from spikecam_env.cli.options import Checked, Seed
 
@@ -73,7 +73,7 @@ class Evaluate:
         | Annotated[SpikeZoo, tyro.conf.subcommand("spikezoo", prefix_name=False)]
         | Annotated[Tasks, tyro.conf.subcommand("tasks", prefix_name=False)]
         | Annotated[Agents, tyro.conf.subcommand("agents", prefix_name=False)]
-        | Annotated[Truth, tyro.conf.subcommand("truth", prefix_name=False)]
+        | Annotated[EvaluateTruth, tyro.conf.subcommand("truth", prefix_name=False)]
     ) = field(default_factory=Quick)
 
     def run(self) -> None:

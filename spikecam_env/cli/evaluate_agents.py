@@ -12,7 +12,7 @@ from spikecam_env.checked import checked_count, checked_whole
 from spikecam_env.cli.options import Checked, Count, Size, Workers
 
 if TYPE_CHECKING:
-    from spikecam_env.agents.study import Case
+    from spikecam_env.agents.study import StudyRun
 
 FILM_FPS = 20
 """Steps a second of a film: 50 times slower than life where a step is a millisecond."""
@@ -97,7 +97,7 @@ class Agents:
         print(text)
         print(f"wrote record.jsonl, agents.txt and curves.png in {self.out}")
 
-    def _film(self, played: list[Case]) -> None:
+    def _film(self, played: list[StudyRun]) -> None:
         from spikecam_env.agents.report import pictures
         from spikecam_env.agents.study import actor_of
         from spikecam_env.cli.panels import write_film

@@ -31,7 +31,7 @@ def _each(values: tuple[float, ...], name: str, least: float, most: float) -> No
 
 
 @dataclass
-class Making:
+class TableOptions:
     """What every table has."""
 
     out: Path | None = None
@@ -66,16 +66,16 @@ class Making:
     def show(self, table: str, **options: Any) -> None:
         """Make a table and print it."""
         from denoiser.evaluate.table_report import report
-        from denoiser.evaluate.tables import Asked, evaluate_table
+        from denoiser.evaluate.tables import TableRequest, evaluate_table
 
-        asked = Asked(out=self.out, rows=self.rows, jobs=self.jobs, weights=self.given(), **options)
+        asked = TableRequest(out=self.out, rows=self.rows, jobs=self.jobs, weights=self.given(), **options)
         print(report(evaluate_table(table, asked, progress=True)), end="")
         if self.out is not None:
             print(f"wrote {table}.txt, {table}.json and {table}.png in {self.out}")
 
 
 @dataclass
-class OnScenes(Making):
+class OnScenes(TableOptions):
     """A table on PHM_N."""
 
     scenes: Annotated[tuple[str, ...], tyro.conf.arg(metavar="NAME...", help_behavior_hint="(default: the ten)")] = ()
@@ -110,7 +110,7 @@ class OnScenes(Making):
 
 
 @dataclass
-class OnRecordings(Making):
+class OnRecordings(TableOptions):
     """A table on real recordings."""
 
     recordings: Path | None = None
@@ -166,7 +166,7 @@ class Table4(OnRecordings):
 
 
 @dataclass
-class StillScenes(Making):
+class StillScenes(TableOptions):
     """Scenes in which nothing moves: the mean of 400 frames, with and without a calibration of the camera.
 
     example:  spikecam evaluate still --out evaluation

@@ -13,7 +13,7 @@ from spikecam_env.cli.options import Checked, Seed
 
 
 @dataclass
-class Truth:
+class EvaluateTruth:
     """Compare with measured truth: a recording's other half, the fixed pattern of a moving one, measured cameras.
 
     Without recordings the simulated tests alone are run.  Options of reading a recording go into a side file beside

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, Literal
 import tyro
 
 from spikecam_env.checked import LARGEST_COUNT
-from spikecam_env.cli.camera import Camera
+from spikecam_env.cli.camera import CameraOptions
 from spikecam_env.cli.options import Count, Positive, Seed, Size, Whole
 from spikecam_env.errors import InputError
 
@@ -58,7 +58,7 @@ class FilmToSpikes:
     """The same, in seconds of the film's true time."""
     size: Size = (250, 400)
     """Rows and columns; the middle of the film that has these proportions is seen."""
-    camera: Camera = field(default_factory=Camera)
+    camera: CameraOptions = field(default_factory=CameraOptions)
     seed: Seed = 0
     """Seed of the camera unit and its noise."""
     truth_every: Whole | None = None

@@ -12,7 +12,7 @@ from spikecam_env.cli.options import Seed, Workers
 
 
 @dataclass
-class Ladder:
+class LadderCommand:
     """Add what a model lacks, one effect after another, and show the gap fall: ladder.json, ladder.png, model.toml.
 
     example:  spikecam ladder camera-17 --model ideal --out ladder

@@ -11,10 +11,10 @@ from typing import TYPE_CHECKING, Annotated
 import tyro
 
 from spikecam_env.checked import checked_number
-from spikecam_env.cli.camera import Camera
+from spikecam_env.cli.camera import CameraOptions
 from spikecam_env.cli.mode_weights import Mode
 from spikecam_env.cli.options import Checked, Count, Positive, Rpm, Seed, Size
-from spikecam_env.cli.reading import Reading
+from spikecam_env.cli.reading import ReadingOptions
 from spikecam_env.errors import InputError, unknown_name
 
 if TYPE_CHECKING:
@@ -67,8 +67,8 @@ class Live:
     """Speed of the scene `disk`; default 2000."""
     seed: Seed = 0
     """Of a scene, its camera unit and noise."""
-    camera: Camera = field(default_factory=Camera)
-    reading: Reading = field(default_factory=Reading)
+    camera: CameraOptions = field(default_factory=CameraOptions)
+    reading: ReadingOptions = field(default_factory=ReadingOptions)
 
     def run(self) -> None:
         from denoiser.live import LiveDnSS
@@ -105,7 +105,7 @@ class Live:
     @contextmanager
     def _source(self) -> Iterator[Source]:
         from scenes.catalogue import SCENES
-        from spikecam_env.cli.live.simulated import Simulated
+        from spikecam_env.cli.live.simulated import SimulatedSource
         from spikecam_env.cli.named_scene import scene_named
         from spikecam_env.sensor import SpikeSensor
         from spikecam_env.streams.sources import is_flow, open_source
@@ -114,7 +114,7 @@ class Live:
             model = self.camera.load()
             scene = scene_named(self.source, self.size, self.seed, model.frame_rate_hz, self.rpm)
             sensor = SpikeSensor(model, self.size, self.seed, engine="auto")
-            yield Simulated(self.source, scene, sensor, self.speed or 1.0)
+            yield SimulatedSource(self.source, scene, sensor, self.speed or 1.0)
             return
         if not Path(self.source).suffix and not is_flow(self.source):
             raise unknown_name("scene, file or address", self.source, SCENES)

@@ -22,7 +22,7 @@ from spikecam_env.cli.evaluate import Evaluate
 from spikecam_env.cli.export import Export
 from spikecam_env.cli.film_to_spikes import FilmToSpikes
 from spikecam_env.cli.first_words import START, check_words
-from spikecam_env.cli.ladder import Ladder
+from spikecam_env.cli.ladder import LadderCommand
 from spikecam_env.cli.live_stream import Live
 from spikecam_env.cli.options import check_options
 from spikecam_env.cli.play import Play
@@ -30,7 +30,7 @@ from spikecam_env.cli.record import Record
 from spikecam_env.cli.scenes import Scenes
 from spikecam_env.cli.train import Train
 from spikecam_env.cli.train_agent import TrainAgent
-from spikecam_env.cli.view import View
+from spikecam_env.cli.view import ViewCommand
 from spikecam_env.cli.warned import warnings_as_lines
 from spikecam_env.errors import InputError
 from spikecam_env.stopping import Stopped
@@ -53,7 +53,7 @@ COMMANDS: dict[str, Any] = {
     "film": FilmToSpikes,
     "scenes": Scenes,
     "play": Play,
-    "view": View,
+    "view": ViewCommand,
     "dataset": Dataset,
     "export": Export,
     "denoise": Denoise,
@@ -64,7 +64,7 @@ COMMANDS: dict[str, Any] = {
     "calibrate": Calibrate,
     "campaign": Campaigns,
     "diagnose": Diagnose,
-    "ladder": Ladder,
+    "ladder": LadderCommand,
     "effects": Effects,
     "bench": Bench,
 }

@@ -22,7 +22,7 @@ MARGIN, CAPTION = 10, 50
 
 
 @dataclass(frozen=True)
-class Panel:
+class PicturePanel:
     """A picture (H, W) in linear radiance with a title and a line below it."""
 
     picture: NDArray[np.floating]
@@ -35,7 +35,7 @@ def display(radiance: NDArray[np.floating], white: float) -> NDArray[np.uint8]:
     return (255.0 * np.clip(np.asarray(radiance, np.float64) / white, 0, 1) ** (1 / 2.2) + 0.5).astype(np.uint8)
 
 
-def compose(panels: Sequence[Panel], white: float, corner: str = "") -> NDArray[np.uint8]:
+def compose(panels: Sequence[PicturePanel], white: float, corner: str = "") -> NDArray[np.uint8]:
     """Panels in a row with captions, and a line in the lower right corner; (rows, columns, 3) uint8, even sizes."""
     height, width = panels[0].picture.shape
     scale = panel_scale(width)
@@ -60,7 +60,7 @@ def panel_scale(width: int) -> int:
     return max(1, round(300 / width))
 
 
-def sheet(panels: Sequence[Panel], columns: int) -> NDArray[np.uint8]:
+def sheet(panels: Sequence[PicturePanel], columns: int) -> NDArray[np.uint8]:
     """Panels row by row, white being 1; (rows, columns, 3) uint8."""
     rows = [compose(panels[i : i + columns], 1.0) for i in range(0, len(panels), columns)]
     width = max(row.shape[1] for row in rows)

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 import tyro
 
 from spikecam_env.checked import checked_count, checked_number
-from spikecam_env.cli.camera import Camera
+from spikecam_env.cli.camera import CameraOptions
 from spikecam_env.cli.options import Checked, Seed, Size
 from spikecam_env.errors import InputError
 
@@ -64,7 +64,7 @@ class Play:
     """Seed of the first episode; each further episode has the next number."""
     size: Size | None = None
     """Rows and columns, instead of the environment's."""
-    camera: Camera = field(default_factory=Camera)
+    camera: CameraOptions = field(default_factory=CameraOptions)
 
     def run(self) -> None:
         from spikecam_env.cli.live.players import Player, player, steering
@@ -113,11 +113,11 @@ class Play:
         self, env: gymnasium.Env[Any, Any], acting: Player, screen: Screen, held: set[str]
     ) -> list[Moment]:
         from spikecam_env.cli.live.filming import watch
-        from spikecam_env.cli.live.window import Window
+        from spikecam_env.cli.live.window import DisplayWindow
 
         seeds = count(self.seed) if self.episodes is None else range(self.seed, self.seed + self.episodes)
         return watch(
-            env, acting, screen, seeds, self.slow, lambda picture: Window(f"spikecam {self.id}", picture, held)
+            env, acting, screen, seeds, self.slow, lambda picture: DisplayWindow(f"spikecam {self.id}", picture, held)
         )
 
     def _as_a_film(self, env: gymnasium.Env[Any, Any], acting: Player, screen: Screen, film: Path) -> list[Moment]:

@@ -9,7 +9,7 @@ from spikecam_env.cli.options import Count, Whole
 
 
 @dataclass(frozen=True)
-class Reading:
+class ReadingOptions:
     """Options of reading; which apply depends on the format.  A file `recording.dat.json` beside a recording can hold
     height, width, crop_width, flip, bit_order and frame_rate_hz; options given here have precedence."""
 

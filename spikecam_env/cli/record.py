@@ -6,7 +6,7 @@ import math
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from spikecam_env.cli.camera import Camera
+from spikecam_env.cli.camera import CameraOptions
 from spikecam_env.cli.options import Count, Rpm, Seed, Size, Whole
 
 
@@ -23,7 +23,7 @@ class Record:
     """What the camera looks at: the rotating disk, or another scene of `spikecam scenes`."""
     frames: Count = 4000
     """Spike frames to record; 40 000 are a second."""
-    camera: Camera = field(default_factory=Camera)
+    camera: CameraOptions = field(default_factory=CameraOptions)
     rpm: Rpm | None = None
     """Speed of the disk; default 2000."""
     size: Size = (250, 400)

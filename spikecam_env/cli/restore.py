@@ -12,22 +12,13 @@ import numpy as np
 from tqdm import tqdm
 
 from denoiser import OnlineDnSS
-from spikecam_env.cli.before_after import (
-    WINDOW,
-    Picture,
-    Spikes,
-    instant_panel,
-    light_db,
-    light_panel,
-    mean_panel,
-    over,
-    white_of,
-)
-from spikecam_env.cli.panels import Panel
+from spikecam_env.cli.before_after import WINDOW, instant_panel, light_db, light_panel, mean_panel, over, white_of
+from spikecam_env.cli.panels import PicturePanel
 from spikecam_env.cli.recording import HDF5
 from spikecam_env.errors import InputError
 from spikecam_env.streams import middleTFI, middleTFP, read_truth
 from spikecam_env.streams.hdf5 import is_recording
+from spikecam_env.types import Pictures, Spikes
 
 CHUNK = 16
 """Frames pushed at a time."""
@@ -45,9 +36,9 @@ class DenoisedRecording:
     """(T, H, W), as recorded."""
     denoised: Spikes
     """(T, H, W)."""
-    planes: dict[int, Picture]
+    planes: dict[int, Pictures]
     """Rate planes (H, W) [spikes/frame] by frame."""
-    light: dict[int, Picture]
+    light: dict[int, Pictures]
     """True light (H, W) [spikes/frame] in the middle of frames, where the recording has it."""
     window: int
     """Frames of the pictures that are means."""
@@ -68,7 +59,7 @@ class DenoisedRecording:
         """The frame nearest the middle; of those with true light where there are any."""
         return min(self.light or self.film_frames, key=lambda frame: abs(frame - len(self.noisy) // 2))
 
-    def panels(self, frame: int, *, light: bool = True) -> list[Panel]:
+    def panels(self, frame: int, *, light: bool = True) -> list[PicturePanel]:
         """Before and after at a frame; light: beside the true light, where it is known."""
         known = self.light.get(frame) if light else None
         shown = [
@@ -87,7 +78,7 @@ class DenoisedRecording:
         """A row a picture: mean rate [spikes/frame], and PSNR [dB] where the true light is known; means over the frames
         with true light, or else over MOST_JUDGED of the planes."""
         frames = list(self.light) or evenly(list(self.planes), MOST_JUDGED)
-        pictures: dict[tuple[str, str], Callable[[int], Picture]] = {
+        pictures: dict[tuple[str, str], Callable[[int], Pictures]] = {
             ("noisy spikes", over(self.window)): lambda t: middleTFP(self.noisy, t, self.window),
             ("noisy spikes", "one interval"): lambda t: middleTFI(self.noisy, t),
             ("denoised spikes", over(self.window)): lambda t: middleTFP(self.denoised, t, self.window),
@@ -146,7 +137,7 @@ def whole_windows(frames: int, window: int) -> range:
     return range(window // 2, frames - window // 2)
 
 
-def light_at(path: Path, frames: Sequence[int], shape: tuple[int, int]) -> dict[int, Picture]:
+def light_at(path: Path, frames: Sequence[int], shape: tuple[int, int]) -> dict[int, Pictures]:
     """True light of a recording in the middle of some of these frames, at most MOST_JUDGED, by frame.
 
     Empty for a file that is not of this package or has none.  Raises InputError where it is damaged.
@@ -159,14 +150,14 @@ def light_at(path: Path, frames: Sequence[int], shape: tuple[int, int]) -> dict[
     return {frame: _light(path, rows[frame], shape) for frame in known}
 
 
-def _light(path: Path, row: int, shape: tuple[int, int]) -> Picture:
+def _light(path: Path, row: int, shape: tuple[int, int]) -> Pictures:
     light = read_truth(path, ("radiance",), slice(row, row + 1)).get("radiance", np.empty(0))
     if light.shape != (1, *shape) or light.dtype.kind not in "iuf" or not np.isfinite(light).all():
         raise InputError(f"{path}: truth: radiance must be finite numbers of shape {shape} at each instant")
     return np.asarray(light[0], np.float32)
 
 
-def restore(noisy: Spikes, online: OnlineDnSS, at: Iterable[int]) -> tuple[Spikes, dict[int, Picture], float]:
+def restore(noisy: Spikes, online: OnlineDnSS, at: Iterable[int]) -> tuple[Spikes, dict[int, Pictures], float]:
     """Denoise a stream.
 
     Args:
@@ -178,7 +169,7 @@ def restore(noisy: Spikes, online: OnlineDnSS, at: Iterable[int]) -> tuple[Spike
         (T, H, W) denoised spikes, rate planes (H, W) [spikes/frame] by frame in order, and the denoiser's time [s].
     """
     wanted = set(at)
-    planes: dict[int, Picture] = {}
+    planes: dict[int, Pictures] = {}
     spikes = np.empty_like(noisy)
     ready, began = 0, time.perf_counter()
     with tqdm(total=len(noisy), desc="denoise", unit="frame", leave=False) as bar:

@@ -101,13 +101,13 @@ class Scenes:
         from tqdm import tqdm
 
         from scenes.catalogue import SCENES
-        from spikecam_env.cli.panels import Panel, sheet, write_picture
+        from spikecam_env.cli.panels import PicturePanel, sheet, write_picture
 
         names = (self.name,) if self.name else SCENES
         panels = []
         for name in tqdm(names, desc="scenes", unit="scene", leave=False):
             light = self._scene(name).truth(SHOWN_AT).radiance
-            panels.append(Panel(light / _white(light), name, about(name).partition(": ")[2]))
+            panels.append(PicturePanel(light / _white(light), name, about(name).partition(": ")[2]))
         write_picture(path, sheet(panels, COLUMNS))
         print(f"wrote {path}: {len(names)} scene{'s' if len(names) > 1 else ''}")
 

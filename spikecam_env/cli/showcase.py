@@ -15,20 +15,12 @@ from denoiser import OnlineDnSS
 from denoiser.metrics import psnr_db
 from scenes.protocol import Gaze
 from spikecam_env.checked import checked_memory
-from spikecam_env.cli.before_after import (
-    WINDOW,
-    Picture,
-    Spikes,
-    instant_panel,
-    light_db,
-    light_panel,
-    mean_panel,
-    white_of,
-)
-from spikecam_env.cli.panels import Panel, compose
+from spikecam_env.cli.before_after import WINDOW, instant_panel, light_db, light_panel, mean_panel, white_of
+from spikecam_env.cli.panels import PicturePanel, compose
 from spikecam_env.errors import InputError
 from spikecam_env.sensor import SensorModel
 from spikecam_env.streams import middleTFI, middleTFP
+from spikecam_env.types import Pictures, Spikes
 
 BLOCK = 25
 """Frames a step; odd, since the truth of a block is that of its middle frame."""
@@ -55,8 +47,8 @@ class Streamed:
     noisy: Spikes
     clean: Spikes
     denoised: Spikes
-    planes: list[Picture]
-    truths: list[Picture]
+    planes: list[Pictures]
+    truths: list[Pictures]
     camera_s: float
     denoiser_s: float
     latency: int
@@ -100,8 +92,8 @@ def stream(
     noisy: list[Spikes] = []
     clean: list[Spikes] = []
     denoised: list[Spikes] = []
-    planes: list[Picture] = []
-    truths: list[Picture] = []
+    planes: list[Pictures] = []
+    truths: list[Pictures] = []
     camera_s = denoiser_s = 0.0
     blocks = -(-frames // BLOCK)
     for step in tqdm(range(blocks + 1), desc="stream", unit="block", leave=False):
@@ -167,7 +159,7 @@ def _picture(run: Streamed, block: int) -> NDArray[np.uint8]:
     return compose(_panels(run, block), white_of(run.truths[0]), corner)
 
 
-def _panels(run: Streamed, block: int) -> list[Panel]:
+def _panels(run: Streamed, block: int) -> list[PicturePanel]:
     frame, light = block * BLOCK + BLOCK // 2, run.truths[block]
     return [
         mean_panel("noisy spikes", run.noisy, frame, WINDOW, light),

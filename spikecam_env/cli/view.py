@@ -11,9 +11,9 @@ from typing import TYPE_CHECKING, Annotated, Literal
 import tyro
 
 from spikecam_env.checked import checked_memory
-from spikecam_env.cli.camera import Camera
+from spikecam_env.cli.camera import CameraOptions
 from spikecam_env.cli.options import Count, Seed, Size
-from spikecam_env.cli.reading import Reading
+from spikecam_env.cli.reading import ReadingOptions
 from spikecam_env.errors import InputError, unknown_name
 
 if TYPE_CHECKING:
@@ -26,7 +26,7 @@ ENDING = ".rrd"
 
 
 @dataclass
-class View:
+class ViewCommand:
     """Look at a scene, a recording or an episode: noisy and denoised pictures, rates of pixels, statistics; of an
     episode reward and gaze too.  In rerun's viewer (pip install 'spikecam-env[view]'), or as a file for it.
 
@@ -55,8 +55,8 @@ class View:
     """Seed of the scene and the camera's unit, or of the episode."""
     size: Size | None = None
     """Rows and columns of a scene or an environment; default: 250 x 400, or the environment's own."""
-    camera: Camera = field(default_factory=Camera)
-    reading: Reading = field(default_factory=Reading)
+    camera: CameraOptions = field(default_factory=CameraOptions)
+    reading: ReadingOptions = field(default_factory=ReadingOptions)
 
     def run(self) -> None:
         from spikecam_env.cli.live.rerun_log import recorded, watched

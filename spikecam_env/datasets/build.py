@@ -19,7 +19,7 @@ from tqdm import tqdm
 
 from spikecam_env.checked import checked_count, checked_disk
 from spikecam_env.datasets.manifest import NAME, Manifest
-from spikecam_env.datasets.plan import Entry, Plan
+from spikecam_env.datasets.plan import Plan, PlannedScene
 from spikecam_env.datasets.processes import on_processes
 from spikecam_env.datasets.ray_cluster import connected, on_ray
 from spikecam_env.datasets.renderer import AUTO, first_that_works
@@ -30,7 +30,7 @@ from spikecam_env.stopping import when_stopped
 from spikecam_env.streams.packing import packed_bytes
 from spikecam_env.whole import clear_unfinished, is_unfinished
 
-AtWork = Callable[[Plan, Path, tuple[Entry, ...]], Iterator[Written | int]]
+AtWork = Callable[[Plan, Path, tuple[PlannedScene, ...]], Iterator[Written | int]]
 """Files as they are done, in any order, and between them how many more frames are."""
 
 
@@ -102,7 +102,7 @@ def _begun(plan: Plan, folder: Path) -> Manifest:
     return found.without_lost(folder)
 
 
-def _missing(plan: Plan, manifest: Manifest) -> tuple[Entry, ...]:
+def _missing(plan: Plan, manifest: Manifest) -> tuple[PlannedScene, ...]:
     done = {file["path"] for file in manifest.files if file["sha256"] is not None}
     return tuple(entry for entry in plan.entries if entry.path not in done)
 
@@ -154,5 +154,5 @@ def _workers(jobs: int, ray: str | None) -> Iterator[AtWork]:
         yield _here
 
 
-def _here(plan: Plan, folder: Path, entries: tuple[Entry, ...]) -> Iterator[Written | int]:
+def _here(plan: Plan, folder: Path, entries: tuple[PlannedScene, ...]) -> Iterator[Written | int]:
     return chain.from_iterable(write_scene(plan, entry, folder) for entry in entries)

@@ -31,7 +31,7 @@ PHM = ("ball", "cook", "dice", "doll", "fan", "fly", "hand", "jump", "poker", "t
 
 
 @dataclass(frozen=True)
-class Entry:
+class PlannedScene:
     """One scene, and the camera it is recorded with.
 
     path        of its file in the dataset's folder; its first part is the split, "train" or "test"
@@ -66,7 +66,7 @@ class Plan:
     """
 
     kind: str
-    entries: tuple[Entry, ...]
+    entries: tuple[PlannedScene, ...]
     shape: tuple[int, int] = (250, 400)
     frames: int = 1000
     seed: int = 0
@@ -89,7 +89,7 @@ class Plan:
         checked_count(self.frames)
         checked_shape(self.shape)
 
-    def scene(self, entry: Entry) -> Scene:
+    def scene(self, entry: PlannedScene) -> Scene:
         """The scene of an entry."""
         return make_scene(
             entry.scene,
@@ -125,7 +125,7 @@ def spift_n(*, train: int = 100, test: int = 10, seed: int = 0, **settings: Any)
     counts = {"train": checked_seed(train, "train", MOST_SCENES), "test": checked_seed(test, "test", MOST_SCENES)}
     checked_seed(seed)
     entries = tuple(
-        Entry(f"{split}/{number:03}.h5", RANDOM, *_seeds(seed, split, number))
+        PlannedScene(f"{split}/{number:03}.h5", RANDOM, *_seeds(seed, split, number))
         for split, count in counts.items()
         for number in range(count)
     )
@@ -142,7 +142,7 @@ def phm_n(*, scenes: tuple[str, ...] = PHM, seed: int = 0, **settings: Any) -> P
     for name in scenes:
         if scenes.count(name) > 1:
             raise InputError(f"scene {name!r} is listed {scenes.count(name)} times; list it once")
-    entries = tuple(Entry(f"test/{name}.h5", name, seed, _seeds(seed, name, 0)[1]) for name in scenes)
+    entries = tuple(PlannedScene(f"test/{name}.h5", name, seed, _seeds(seed, name, 0)[1]) for name in scenes)
     return Plan("phm-n", entries, seed=seed, **settings)
 
 

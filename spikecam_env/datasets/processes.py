@@ -18,7 +18,7 @@ from multiprocessing.connection import Connection
 from multiprocessing.process import BaseProcess
 from pathlib import Path
 
-from spikecam_env.datasets.plan import Entry, Plan
+from spikecam_env.datasets.plan import Plan, PlannedScene
 from spikecam_env.datasets.worker import use_one_thread
 from spikecam_env.datasets.write import Written, write_scene
 from spikecam_env.errors import InputError
@@ -28,7 +28,7 @@ ATTEMPTS = 3
 """Deaths of workers over one scene before the run gives up."""
 
 
-def on_processes(plan: Plan, folder: Path, entries: tuple[Entry, ...], jobs: int) -> Iterator[Written | int]:
+def on_processes(plan: Plan, folder: Path, entries: tuple[PlannedScene, ...], jobs: int) -> Iterator[Written | int]:
     """As `write_scene` gives them, of all scenes in any order; a count is negative where frames were lost.
 
     Errors: what a worker raised; InputError if workers keep dying.
@@ -67,11 +67,11 @@ class _Worker:
 
     process: BaseProcess
     pipe: Connection
-    entry: Entry
+    entry: PlannedScene
     frames: int = 0
 
     @classmethod
-    def start(cls, plan: Plan, folder: Path, entry: Entry) -> _Worker:
+    def start(cls, plan: Plan, folder: Path, entry: PlannedScene) -> _Worker:
         context = get_context("spawn")
         ours, theirs = context.Pipe()
         process = context.Process(target=_work, args=(theirs, plan, folder), daemon=True)
@@ -82,7 +82,7 @@ class _Worker:
         worker.give(entry)
         return worker
 
-    def give(self, entry: Entry) -> None:
+    def give(self, entry: PlannedScene) -> None:
         """Hand out a scene."""
         self.entry, self.frames = entry, 0
         with suppress(OSError):  # it is dead, and the next look at its pipe finds that
@@ -95,7 +95,7 @@ class _Worker:
         self.process.join()
 
 
-def _count_death(deaths: dict[str, int], entry: Entry) -> None:
+def _count_death(deaths: dict[str, int], entry: PlannedScene) -> None:
     deaths[entry.path] = deaths.get(entry.path, 0) + 1
     if deaths[entry.path] == ATTEMPTS:
         raise InputError(

@@ -13,7 +13,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from types import ModuleType
 
-from spikecam_env.datasets.plan import Entry, Plan
+from spikecam_env.datasets.plan import Plan, PlannedScene
 from spikecam_env.datasets.worker import use_one_thread
 from spikecam_env.datasets.write import Written, write_scene
 from spikecam_env.errors import InputError
@@ -24,7 +24,7 @@ RETRIES = 3
 """Times that a scene is begun again after its worker died."""
 
 
-def on_ray(ray: ModuleType, plan: Plan, folder: Path, entries: tuple[Entry, ...]) -> Iterator[Written | int]:
+def on_ray(ray: ModuleType, plan: Plan, folder: Path, entries: tuple[PlannedScene, ...]) -> Iterator[Written | int]:
     """Files as they are done, in any order, and with each its number of frames.
 
     Args:
@@ -51,7 +51,7 @@ def on_ray(ray: ModuleType, plan: Plan, folder: Path, entries: tuple[Entry, ...]
         yield plan.frames
 
 
-def _file_of(plan: Plan, folder: Path, entry: Entry) -> Written:
+def _file_of(plan: Plan, folder: Path, entry: PlannedScene) -> Written:
     use_one_thread()
     folder.mkdir(parents=True, exist_ok=True)
     *_, written = write_scene(plan, entry, folder)

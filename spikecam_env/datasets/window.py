@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from spikecam_env.errors import InputError
+from spikecam_env.renamed import old_names
 from spikecam_env.streams import isi_plane
 from spikecam_env.streams.hdf5 import CHUNK_FRAMES, OpenRecording, open_recording
 
@@ -22,7 +23,7 @@ FIRST_REACH = 32
 
 
 @dataclass(frozen=True)
-class Window:
+class SpikeWindow:
     """spikes (2 reach + 1, h, w) uint8, noisy; clean_isi (h, w) float32, normalised: 1 / ISI in (0, 1].
 
     >>> plan = Plan("mine", (Entry("train/disk.h5", "disk", 0, 0),), shape=(8, 16), frames=100)
@@ -38,7 +39,7 @@ class Window:
 
 def read_window(
     path: str | Path, frame: int, *, reach: int = 20, rows: slice | None = None, columns: slice | None = None
-) -> Window:
+) -> SpikeWindow:
     """Frames frame - reach .. frame + reach of the noisy stream, and the clean ISI plane at `frame`, of a crop.
 
     rows, columns: slices with start and stop; None for all.  The plane is
@@ -58,7 +59,7 @@ def read_window(
         across, along = _inside(rows, height, "rows", path), _inside(columns, width, "columns", path)
         window = _inside(slice(frame - reach, frame + reach + 1), recording.frames("spikes"), "frames", path)
         spikes = recording.read_crop("spikes", window, across, along)
-        return Window(spikes, _clean_plane(recording, frame, across, along))
+        return SpikeWindow(spikes, _clean_plane(recording, frame, across, along))
 
 
 def _clean_plane(recording: OpenRecording, frame: int, rows: slice, columns: slice) -> NDArray[np.float32]:
@@ -81,3 +82,6 @@ def _inside(part: slice | None, size: int, name: str, path: str | Path) -> slice
     if not 0 <= part.start < part.stop <= size:
         raise InputError(f"{name} {part.start} to {part.stop} asked of {path}, which has {size}")
     return slice(part.start, part.stop)
+
+
+__getattr__ = old_names(__name__, {"Window": "SpikeWindow"})

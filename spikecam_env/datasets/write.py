@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from scenes.protocol import Scene
-from spikecam_env.datasets.plan import Entry, Plan
+from spikecam_env.datasets.plan import Plan, PlannedScene
 from spikecam_env.sensor import SpikeSensor
 from spikecam_env.streams import SpikeWriter
 from spikecam_env.whole import said_of
@@ -28,14 +28,14 @@ _READ_BYTES = 1 << 20
 class Written:
     """A file that is there: its entry, its size, its SHA-256, where the time went [s], and processor time [s]."""
 
-    entry: Entry
+    entry: PlannedScene
     size: int
     sha256: str
     seconds: dict[str, float]
     processor_s: float
 
 
-def write_scene(plan: Plan, entry: Entry, folder: Path) -> Iterator[int | Written]:
+def write_scene(plan: Plan, entry: PlannedScene, folder: Path) -> Iterator[int | Written]:
     """Record one entry into `folder`; gives the number of frames done, piece by piece, and at the end the file."""
     clock, begun = _Clock(), time.process_time()
     with clock.on("start"):
@@ -89,7 +89,7 @@ def sha256_of(path: Path, progress: Callable[[int], object] | None = None) -> st
     return digest.hexdigest()
 
 
-def _attributes(plan: Plan, entry: Entry) -> dict[str, Any]:
+def _attributes(plan: Plan, entry: PlannedScene) -> dict[str, Any]:
     shared = {name: value for name, value in plan.settings().items() if name not in ("shape", "frames", "kind")}
     own = {"scene": entry.scene, "scene_seed": entry.scene_seed, "unit_seed": entry.unit_seed}
     return {"dataset": plan.kind, **shared, **own}

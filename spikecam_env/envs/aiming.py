@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from scenes.protocol import Gaze, Scene
 from spikecam_env.envs.action import checked_action
-from spikecam_env.envs.course import Course, Drive
+from spikecam_env.envs.course import Drive, StepOutcome
 from spikecam_env.envs.episode import Episode, Standing
 from spikecam_env.envs.motor import Motor
 from spikecam_env.envs.spike_camera import SpikeCameraEnv
@@ -68,7 +68,7 @@ class AimingEnv(SpikeCameraEnv):
         self.set_top_rate(self.max_gaze_rate_px_s)
         self.action_space = spaces.Box(-1.0, 1.0, (axes + further,), np.float32)
         self._draw_episode = draw
-        self._course: Course | None = None
+        self._course: StepOutcome | None = None
         self._before: Any = None  # the course as it was a step ago
         self._bare: Any = None  # the scene as it is, without what an action puts before the camera
 
@@ -78,7 +78,7 @@ class AimingEnv(SpikeCameraEnv):
         self.max_gaze_rate_px_s = px_s
 
     @property
-    def course(self) -> Course:
+    def course(self) -> StepOutcome:
         """Where the camera and its episode are; NotReadyError before the first reset."""
         if self._course is None:
             raise self._not_ready()
@@ -109,12 +109,12 @@ class AimingEnv(SpikeCameraEnv):
         """(2,) of the last step [pixels/s]."""
         return np.array(self.course.rate_px_s)
 
-    def opening(self, seed: int, options: dict[str, Any] | None = None) -> Course:
+    def opening(self, seed: int, options: dict[str, Any] | None = None) -> StepOutcome:
         """The beginning of the episode that `reset(seed=seed, options=options)` plays; nothing is exposed.
 
         options: those of the task, without `model` and `light`
         """
-        return Course.begin(self._drive, self._draw_episode(np_random(seed)[0], options or {}))
+        return StepOutcome.begin(self._drive, self._draw_episode(np_random(seed)[0], options or {}))
 
     def begin(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> None:
         """A new episode, with the camera at rest; see the class for the options."""
@@ -149,7 +149,7 @@ class AimingEnv(SpikeCameraEnv):
         return Drive(self.motor, self.axes, self.frames_per_step, self.model.frame_rate_hz)
 
     def _begin(self, rng: np.random.Generator, options: dict[str, Any]) -> Scene:
-        self._course = Course.begin(self._drive, self._draw_episode(rng, options))
+        self._course = StepOutcome.begin(self._drive, self._draw_episode(rng, options))
         return self.episode.scene
 
     def _checked_action(self, action: ArrayLike) -> list[float]:

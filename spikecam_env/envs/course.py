@@ -41,7 +41,7 @@ class Drive:
 
 
 @dataclass(frozen=True, eq=False)
-class Course:
+class StepOutcome:
     """The end of a step, or of the block that reset exposes.
 
     drive      of the camera
@@ -58,12 +58,12 @@ class Course:
     standing: Standing
 
     @classmethod
-    def begin(cls, drive: Drive, episode: Episode) -> Course:
+    def begin(cls, drive: Drive, episode: Episode) -> StepOutcome:
         """After the first block, in which the camera is at rest."""
         gaze = Gaze((0.0, 0.0), (0.0, 0.0), (0.0, float(drive.frames_per_step)))
         return cls(drive, episode, gaze, (0.0, 0.0), _standing(episode, gaze, None))
 
-    def after(self, action: Sequence[float]) -> Course:
+    def after(self, action: Sequence[float]) -> StepOutcome:
         """A step later.  action: axes + further numbers, in [-1, 1]."""
         drive, first, top = self.drive, self.standing.frame, self.drive.motor.top_px_s
         stop = first + drive.frames_per_step
@@ -71,7 +71,7 @@ class Course:
         wanted = [number * top for number in action[: drive.axes]] + [0.0] * (2 - drive.axes)
         pan, tilt = drive.motor.after(self.rate_px_s, wanted, drive.step_s)
         gaze = turned(self.gaze.stop, (pan / top, tilt / top), top / drive.frame_rate_hz, (first, stop))
-        return Course(drive, episode, gaze, (pan, tilt), _standing(episode, gaze, self.standing))
+        return StepOutcome(drive, episode, gaze, (pan, tilt), _standing(episode, gaze, self.standing))
 
     @cached_property
     def end(self) -> bool | None:
@@ -104,7 +104,9 @@ class Course:
         return float(self.episode.performance(self.standing))
 
 
-def steps_of(course: Course, act: Callable[[Course], NDArray[np.float32]], most: int | None = None) -> Iterator[Course]:
+def steps_of(
+    course: StepOutcome, act: Callable[[StepOutcome], NDArray[np.float32]], most: int | None = None
+) -> Iterator[StepOutcome]:
     """The courses after each step, up to the one that is over.
 
     Args:

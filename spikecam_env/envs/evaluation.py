@@ -17,10 +17,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.stats import binomtest
 
 from spikecam_env.envs.score import score
+from spikecam_env.types import Floats
 
 CONFIDENCE = 0.95
 """Share of evaluations whose interval covers the score."""
@@ -121,17 +121,14 @@ class Evaluation:
         )
 
 
-Array = NDArray[np.float64]
-
-
-def _wilson(reached: Array, nothing: Array, oracle: Array) -> tuple[float, float]:
+def _wilson(reached: Floats, nothing: Floats, oracle: Floats) -> tuple[float, float]:
     """The interval if every performance is 0 or 1."""
     ends = binomtest(int(reached.sum()), len(reached)).proportion_ci(CONFIDENCE, method="wilson")
     low, high = (score(float(end), float(nothing.mean()), float(oracle.mean())) for end in ends)
     return low, high
 
 
-def _bootstrap(reached: Array, nothing: Array, oracle: Array) -> tuple[float, float]:
+def _bootstrap(reached: Floats, nothing: Floats, oracle: Floats) -> tuple[float, float]:
     """The interval of other performances; NaN for a single episode."""
     count = len(reached)
     if count < 2:

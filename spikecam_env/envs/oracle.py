@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scenes.protocol import Gaze
-from spikecam_env.envs.course import Course
+from spikecam_env.envs.course import StepOutcome
 
 
 def approach(error: NDArray[np.float64], most_change: float) -> NDArray[np.float64]:
@@ -24,7 +24,7 @@ def approach(error: NDArray[np.float64], most_change: float) -> NDArray[np.float
     return np.asarray(np.sign(error) * np.minimum(size, 4 * size / (1 + np.sqrt(1 + 8 * size / most_change))))
 
 
-def oracle(course: Course) -> NDArray[np.float32]:
+def oracle(course: StepOutcome) -> NDArray[np.float32]:
     """The action of the next step."""
     drive, episode, first = course.drive, course.episode, course.standing.frame
     stop, top = first + drive.frames_per_step, drive.motor.top_px_s * drive.step_s

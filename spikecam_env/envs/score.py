@@ -20,7 +20,7 @@ from tqdm import tqdm
 
 from spikecam_env.envs.action import checked_action
 from spikecam_env.envs.aiming import AimingEnv
-from spikecam_env.envs.course import Course, steps_of
+from spikecam_env.envs.course import StepOutcome, steps_of
 from spikecam_env.envs.oracle import oracle
 from spikecam_env.errors import InputError
 
@@ -131,7 +131,7 @@ def ends(env: gymnasium.Env[Any, Any], seeds: Sequence[int]) -> tuple[list[float
     return nothing, best
 
 
-def _end(course: Course, act: Callable[[Course], NDArray[np.float32]], most: int | None) -> float:
+def _end(course: StepOutcome, act: Callable[[StepOutcome], NDArray[np.float32]], most: int | None) -> float:
     """Performance at the end of an episode of `most` steps at most."""
     return [course, *steps_of(course, act, most)][-1].performance
 

@@ -27,7 +27,7 @@ from spikecam_env.checked import (
 from spikecam_env.envs.action import checked_action
 from spikecam_env.envs.keywords import check_keywords
 from spikecam_env.envs.motor import turned
-from spikecam_env.envs.observations import Blocks, Observation, View, observation, with_state, with_state_space
+from spikecam_env.envs.observations import Blocks, CameraView, Observation, observation, with_state, with_state_space
 from spikecam_env.envs.reset_options import as_dictionary
 from spikecam_env.errors import InputError, NotReadyError, OwnCodeError, shown, unknown_name
 from spikecam_env.sensor import Keyframes, SensorModel, SpikeSensor, step_together
@@ -217,9 +217,9 @@ class SpikeCameraEnv(gymnasium.Env[Any, NDArray[np.float32]]):
         done_with(self)
 
     @property
-    def view(self) -> View:
+    def view(self) -> CameraView:
         """What observations know of the camera."""
-        return View(self.shape, self.frames_per_step, self.model.frame_rate_hz)
+        return CameraView(self.shape, self.frames_per_step, self.model.frame_rate_hz)
 
     @property
     def sensor(self) -> SpikeSensor:

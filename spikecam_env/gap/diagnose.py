@@ -22,7 +22,7 @@ from spikecam_env.gap.baseline.contradiction import Contradiction
 from spikecam_env.gap.baseline.halves_floor import floor_of_halves
 from spikecam_env.gap.baseline.label_audit import audit, upheld
 from spikecam_env.gap.baseline.missing_from_refit import missing_effects, with_missing
-from spikecam_env.gap.baseline.motion import Motion
+from spikecam_env.gap.baseline.motion import DetectedMotion
 from spikecam_env.gap.baseline.null_model import model_null
 from spikecam_env.gap.baseline.off_nominal import OffNominal, off_nominal
 from spikecam_env.gap.baseline.static_part import Observed, looked_at, without_motion
@@ -109,7 +109,7 @@ def diagnose(
     tested = replace(tested, frame_rate_hz=measured.frame_rate_hz)
     names = chosen(tested, candidates, exclude)
     if any(r.spikes for r in measured.recordings):
-        asked = Asked(tuple(names), seed, jobs, effort, twin_count, static_only, settings, bounds)
+        asked = DiagnosisRequest(tuple(names), seed, jobs, effort, twin_count, static_only, settings, bounds)
         found = of_spikes(measured, tested, asked, templates, stages)
     else:
         with stages.timed("maps"):
@@ -160,11 +160,11 @@ class Findings:
     not_bounded: tuple[tuple[str, str], ...] = ()
     notes: tuple[str, ...] = ()
     simulated: int = 0
-    motion: tuple[Motion, ...] = ()
+    motion: tuple[DetectedMotion, ...] = ()
 
 
 @dataclass(frozen=True)
-class Asked:
+class DiagnosisRequest:
     """How a campaign is to be diagnosed: names of candidates, and options as of `diagnose`."""
 
     names: tuple[str, ...]
@@ -178,7 +178,7 @@ class Asked:
 
 
 def of_spikes(
-    measured: Campaign, tested: SensorModel, asked: Asked, templates: Templates | None, stages: Stages
+    measured: Campaign, tested: SensorModel, asked: DiagnosisRequest, templates: Templates | None, stages: Stages
 ) -> Findings:
     """A campaign of spikes, from its files to what a diagnosis says of it: one room after another."""
     with stages.timed("read"):
@@ -269,7 +269,7 @@ def refittable(conditions: Sequence[Condition]) -> bool:
     return scenes or sum(c.kind in STEADY_KNOWN and c.use == "fit" for c in conditions) >= 2
 
 
-def comparison_of(case: Case, tested: SensorModel, asked: Asked, stages: Stages) -> Comparison:
+def comparison_of(case: Case, tested: SensorModel, asked: DiagnosisRequest, stages: Stages) -> Comparison:
     """The case beside a model, without a search: labels that contradict, effects that the refit says are missing, what
     is off nominal, and the null model's twins."""
     with stages.timed("audit"):

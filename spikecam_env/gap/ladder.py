@@ -16,7 +16,6 @@ from typing import Any
 
 import numpy as np
 from matplotlib.figure import Figure
-from numpy.typing import NDArray
 from tqdm import tqdm
 
 from spikecam_env.campaign.reading import Campaign, read_campaign
@@ -39,9 +38,8 @@ from spikecam_env.gap.twins.workers import sums_in_one_order
 from spikecam_env.gap.unit.label_unit import label_unit_note
 from spikecam_env.gap.verdict.comparison import aligned_mean
 from spikecam_env.sensor import Effect, SensorModel
+from spikecam_env.types import Floats
 from spikecam_env.whole import whole_folder, write_text_whole
-
-Array = NDArray[np.float64]
 
 LADDER_FORMAT = "spikecam-ladder/1"
 
@@ -137,7 +135,7 @@ def ladder(
     names, _ = testable(chosen(first, None, ()), case.conditions)
     lacking = missing_effects(case, first, names)
     null = model_null(case, with_missing(first, lacking), twin_count)
-    judge = Judge(case, null, values_of(case.bank, null.keys))
+    judge = RungStatistics(case, null, values_of(case.bank, null.keys))
     rungs = climbed(judge, first, lacking, progress)
     rungs += searched(judge, with_missing(first, lacking), names)
     notes = tuple(label_unit_note(case.nominal_per_label, case.base))
@@ -145,14 +143,14 @@ def ladder(
 
 
 @dataclass(frozen=True)
-class Judge:
+class RungStatistics:
     """By what all rungs are judged: the statistics of a case, (S,) as measured, in the noise of the last model."""
 
     case: Case
     null: Null
-    values: Array
+    values: Floats
 
-    def rung(self, model: SensorModel, mean: Array, found: Missing | None) -> Rung:
+    def rung(self, model: SensorModel, mean: Floats, found: Missing | None) -> Rung:
         """A model as a rung.  mean: (S,) what it predicts; found: its newest effect."""
         square = np.nan_to_num((self.values - mean) / self.null.noise) ** 2
         group = np.array([k.group for k in self.null.keys])
@@ -168,7 +166,7 @@ class Judge:
         )
 
 
-def climbed(judge: Judge, first: SensorModel, lacking: Sequence[Missing], progress: bool) -> list[Rung]:
+def climbed(judge: RungStatistics, first: SensorModel, lacking: Sequence[Missing], progress: bool) -> list[Rung]:
     """The first model, then what the refit found missing, one after another: each time the one that takes away most."""
 
     def simulated(model: SensorModel, found: Missing | None, *, last: bool) -> Rung:
@@ -193,7 +191,7 @@ def climbed(judge: Judge, first: SensorModel, lacking: Sequence[Missing], progre
     return rungs
 
 
-def searched(judge: Judge, model: SensorModel, names: Sequence[str]) -> list[Rung]:
+def searched(judge: RungStatistics, model: SensorModel, names: Sequence[str]) -> list[Rung]:
     """Rungs of effects that a search adds to a model, where that still differs from the recordings to fit."""
     case, null, values = judge.case, judge.null, judge.values
     if not is_discrepant(null, values_to_fit(case, null, values)):

@@ -11,10 +11,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from spikecam_env.gap.baseline.motion import Motion
+from spikecam_env.gap.baseline.motion import DetectedMotion
 from spikecam_env.gap.baseline.static_part import static_pixels
 from spikecam_env.gap.observe.conditions import Condition
-from spikecam_env.gap.observe.observation import Observation
+from spikecam_env.gap.observe.observation import ObservedRecording
 from spikecam_env.gap.twins.budget import CAMPAIGNS
 from spikecam_env.gap.unit.refit import BaseFit
 from spikecam_env.sensor import SensorModel
@@ -201,13 +201,13 @@ class Evidence:
     """
 
     conditions: tuple[Condition, ...]
-    measured: tuple[Observation, ...]
-    before: tuple[Observation, ...]
-    after: tuple[Observation, ...] | None
+    measured: tuple[ObservedRecording, ...]
+    before: tuple[ObservedRecording, ...]
+    after: tuple[ObservedRecording, ...] | None
     free_refit: BaseFit
     before_base: BaseFit
     after_base: BaseFit | None
-    again: tuple[Observation, ...] | None = None
+    again: tuple[ObservedRecording, ...] | None = None
     drawn_before: tuple[NDArray[np.float64], NDArray[np.float64]] | None = None
     drawn_after: tuple[NDArray[np.float64], NDArray[np.float64]] | None = None
     light: str = LABELLED_LIGHT
@@ -302,7 +302,7 @@ class Diagnosis:
     effort: float = CAMPAIGNS
     not_bounded: tuple[tuple[str, str], ...] = ()
     effect_files: tuple[str, ...] = ()
-    motion: tuple[Motion, ...] = ()
+    motion: tuple[DetectedMotion, ...] = ()
     static_only: bool = False
     remainder: Remainder | None = None
     settings: dict[str, Any] = field(default_factory=dict)

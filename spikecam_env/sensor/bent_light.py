@@ -20,12 +20,12 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from spikecam_env.errors import InputError
 from spikecam_env.sensor import drive
-from spikecam_env.sensor.effects.base import Array, Bend, Effect, Exposure, Feedback
+from spikecam_env.sensor.effects.base import Bend, Effect, ExposureBlock, Feedback
 from spikecam_env.sensor.light import GRAINS, INSTANT, Keyframes, course
+from spikecam_env.types import Floats, Pictures
 
 ALLOWED = 0.01
 """Share of a frame's charge by which an effect may be off: a rate is off by no more."""
@@ -34,16 +34,19 @@ FAINT = 0.01
 """Charge [thresholds]: of a frame that has less, so much is the whole.  What is off is then a ten-thousandth of a
 threshold a frame at most, less than an electron."""
 
-Picture = NDArray[np.float32]
 
-
-def concerned(effects: Sequence[Effect], first: Exposure) -> bool:
+def concerned(effects: Sequence[Effect], first: ExposureBlock) -> bool:
     """Whether any of these effects may be off in light that bends within a frame."""
     return any(_sways(e, first) or _acts(e.feedback(first)) or e.overrides("off_the_line") for e in effects)
 
 
 def check_bent(
-    light: Keyframes, start: int, frames: int, first: Exposure, effects: Sequence[Effect], image: Callable[..., Picture]
+    light: Keyframes,
+    start: int,
+    frames: int,
+    first: ExposureBlock,
+    effects: Sequence[Effect],
+    image: Callable[..., Pictures],
 ) -> None:
     """Raise InputError for the first frame of start .. start + frames whose light takes an effect off by too much.
 
@@ -72,7 +75,7 @@ def frames_with_keys(light: Keyframes, start: int, stop: int) -> Iterator[int]:
     return iter(np.unique(np.floor(times[times != np.floor(times)])).astype(np.int64).tolist())
 
 
-def bend_of(light: Keyframes, frame: int, now: Exposure, image: Callable[..., Picture]) -> Bend:
+def bend_of(light: Keyframes, frame: int, now: ExposureBlock, image: Callable[..., Pictures]) -> Bend:
     """How the charge of every pixel comes in that frame."""
     times, pictures = course(light, frame)
     gain, dark = (a.astype(np.float64) / GRAINS for a in now.unit.grains_per_frame)
@@ -91,7 +94,7 @@ def bend_of(light: Keyframes, frame: int, now: Exposure, image: Callable[..., Pi
     return Bend(*(a.reshape(now.shape) for a in (mean, uneven, moved, bent, off_line)))
 
 
-def error(effect: Effect, bend: Bend, now: Exposure) -> Array:
+def error(effect: Effect, bend: Bend, now: ExposureBlock) -> Floats:
     """By how much an effect may take a frame's charge off (H, W) [thresholds]; see the module's equations."""
     x, moved_share = bend.mean, np.minimum(bend.moved / np.maximum(bend.mean, 1e-12), 1.0)
     feedback = effect.feedback(now)
@@ -104,7 +107,7 @@ def error(effect: Effect, bend: Bend, now: Exposure) -> Array:
     return off + effect.off_the_line(bend, now)
 
 
-def _sways(effect: Effect, first: Exposure) -> bool:
+def _sways(effect: Effect, first: ExposureBlock) -> bool:
     return effect.overrides("sway") and effect.parts(first.frame_rate_hz) > 0
 
 
@@ -117,7 +120,7 @@ def _acts(feedback: Feedback) -> bool:
     )
 
 
-def _mean_size(begin: Array, end: Array) -> Array:
+def _mean_size(begin: Floats, end: Floats) -> Floats:
     """Mean of |a| over a stretch on which a goes straight from `begin` to `end`."""
     both = abs(begin) + abs(end)
     crosses = begin * end < 0.0

@@ -12,20 +12,19 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from spikecam_env.types import Floats
 
 
 class KeyWeights(NamedTuple):
     """mean, rise: (n,) weights of the keys first .. first + n."""
 
     first: int
-    mean: Array
-    rise: Array
+    mean: Floats
+    rise: Floats
 
 
-def key_weights(times: Array, start: float, stop: float) -> KeyWeights:
+def key_weights(times: Floats, start: float, stop: float) -> KeyWeights:
     """Weights of keys at `times` (K,), strictly increasing, for the mean over [start, stop] and the rise within it."""
     after = int(np.searchsorted(times, start, side="right"))
     until = int(np.searchsorted(times, stop, side="left"))
@@ -46,7 +45,7 @@ def key_weights(times: Array, start: float, stop: float) -> KeyWeights:
     return KeyWeights(first, weights[0], weights[1])
 
 
-def frame_means(times: Array, values: Array, frames: int) -> Array:
+def frame_means(times: Floats, values: Floats, frames: int) -> Floats:
     """Mean (F,) over each frame [n, n + 1) of a quantity with values (K,) at `times`, e.g. of uniform light."""
     edges = np.arange(frames + 1, dtype=np.float64)
     before = np.concatenate([[0.0], np.cumsum(np.diff(times) * (values[1:] + values[:-1]) / 2.0)])
@@ -56,7 +55,7 @@ def frame_means(times: Array, values: Array, frames: int) -> Array:
     return np.diff(before[key] + beyond * (values[key] + at_edge) / 2.0)
 
 
-def _place(times: Array, t: float) -> tuple[int, float]:
+def _place(times: Floats, t: float) -> tuple[int, float]:
     """The last key at or before t, or the first key, and how far t is on the way to the next, in [0, 1)."""
     key = int(np.searchsorted(times, t, side="right")) - 1
     if key < 0 or key == times.size - 1:

@@ -12,9 +12,10 @@ from typing import Any
 
 import numpy as np
 
-from spikecam_env.sensor.effects.base import Array, Charge, Effect, Exposure, Field, Spikes, Stage, having
+from spikecam_env.sensor.effects.base import Charge, Effect, ExposureBlock, Stage, having
 from spikecam_env.sensor.light import GRAINS, Piece
 from spikecam_env.sensor.model import generator
+from spikecam_env.types import Floats, Masks, Pictures
 
 Memory = dict[str, Any]
 """What each effect remembers, by its name."""
@@ -32,9 +33,9 @@ class Sway:
     factor, common [mV]: (F or 1, H or 1, n), with what holds for the frame.
     """
 
-    at: Array
-    factor: Array
-    common: Array
+    at: Floats
+    factor: Floats
+    common: Floats
 
 
 @dataclass(frozen=True)
@@ -45,14 +46,14 @@ class Comparators:
     grains_per_mV: (P,).  sway: where factor and common move within the frames; these are then the least of each frame.
     """
 
-    factor: Array
-    common: Array
-    field: Field
-    grains_per_mV: Array
+    factor: Floats
+    common: Floats
+    field: Pictures
+    grains_per_mV: Floats
     sway: Sway | None
 
 
-def begin(first: Exposure, effects: Sequence[Effect], seed: int, unit_seed: int | None = None) -> Memory:
+def begin(first: ExposureBlock, effects: Sequence[Effect], seed: int, unit_seed: int | None = None) -> Memory:
     """What each effect remembers at the first frame.
 
     Each has generators of its own: adding or removing one leaves the draws of the others as they were.
@@ -65,11 +66,11 @@ def begin(first: Exposure, effects: Sequence[Effect], seed: int, unit_seed: int 
 
 
 def expected_charge(
-    now: Exposure,
+    now: ExposureBlock,
     effects: Sequence[Effect],
     memory: Memory,
-    mean: Array,
-    rise: Array | float = 0.0,
+    mean: Floats,
+    rise: Floats | float = 0.0,
     pieces: Sequence[Piece] = (),
 ) -> tuple[Charge, Charge]:
     """Charge of the frames from light and in the dark, given that of the light law, mean (F or 1, P) [thresholds].
@@ -103,7 +104,7 @@ def expected_charge(
 
 
 def _collect_by_pieces(
-    effect: Effect, light: Charge, dark: Charge, now: Exposure, memory: Any, pieces: Sequence[Piece]
+    effect: Effect, light: Charge, dark: Charge, now: ExposureBlock, memory: Any, pieces: Sequence[Piece]
 ) -> tuple[Charge, Any, list[Piece]]:
     """What an effect makes of the light of one frame, a piece after another: to its mean and to its rise comes what the
     effect changes, so that what it leaves alone keeps its bits."""
@@ -119,13 +120,13 @@ def _collect_by_pieces(
     return Charge(mean, 1.0, rise), memory, after
 
 
-def _in_proportion(pieces: Sequence[Piece], before: Array, after: Array) -> list[Piece]:
+def _in_proportion(pieces: Sequence[Piece], before: Floats, after: Floats) -> list[Piece]:
     """Pieces of a frame whose charge (H, W) an effect has changed as a whole."""
     share = np.divide(after, before, out=np.ones_like(before), where=before > 0.0).reshape(-1)
     return [piece._replace(mean=piece.mean * share, rise=piece.rise * share) for piece in pieces]
 
 
-def _as_read(light: Charge, lead: Array | float, pieces: Sequence[Piece]) -> Charge:
+def _as_read(light: Charge, lead: Floats | float, pieces: Sequence[Piece]) -> Charge:
     """Light of one frame, rows of which are read `lead` (H, 1) before its end, or a frame and so much less: its rise is
     that of the line of which as much comes after that moment."""
     values = light.values
@@ -156,13 +157,13 @@ def asks_for_pieces(effect: Effect) -> bool:
     return effect.wants_rise and effect.stage < Stage.READOUT
 
 
-def parts(first: Exposure, effects: Sequence[Effect]) -> int:
+def parts(first: ExposureBlock, effects: Sequence[Effect]) -> int:
     """Parts of a frame between the nodes of `Sway`; 0 where no reference moves and nobody is kicked within a frame."""
     kicked = any(effect.feedback(first).kick_at_once for effect in effects)
     return max((effect.parts(first.frame_rate_hz) for effect in effects), default=0) or int(kicked)
 
 
-def lead(first: Exposure, effects: Sequence[Effect]) -> Array:
+def lead(first: ExposureBlock, effects: Sequence[Effect]) -> Floats:
     """How long before the end of the array's frame each row is read (H, 1) [frames].
 
     At u of its own frame, 0 .. 1, the array's clock stands at u - lead.
@@ -170,11 +171,11 @@ def lead(first: Exposure, effects: Sequence[Effect]) -> Array:
     return np.zeros((first.shape[0], 1)) + sum(effect.lead(first) for effect in effects)
 
 
-def comparators(now: Exposure, effects: Sequence[Effect], memory: Memory) -> Comparators:
+def comparators(now: ExposureBlock, effects: Sequence[Effect], memory: Memory) -> Comparators:
     """How the references move in the frames; updates `memory`."""
     whole = (now.frames, now.shape[0])
     factor, common = np.ones((1, 1, 1)), np.zeros((1, 1, 1))
-    fields: list[Field] = []
+    fields: list[Pictures] = []
     for effect in having("compare", effects):
         shift, memory[effect.name] = effect.compare(now, memory[effect.name])
         factor = factor * shift.factor
@@ -193,7 +194,7 @@ def comparators(now: Exposure, effects: Sequence[Effect], memory: Memory) -> Com
     return Comparators(factor, common, field.reshape(-1, pixels), grains_per_mV, sway)
 
 
-def movement(now: Exposure, effect: Effect) -> tuple[Array, Array]:
+def movement(now: ExposureBlock, effect: Effect) -> tuple[Floats, Floats]:
     """Variation and range (H or 1, 1) of the reference that an effect moves within frame `now` [thresholds]."""
     sway = _sway(now, [effect], np.ones((1, 1, 1)), np.zeros((1, 1, 1)))
     if sway is None:
@@ -202,7 +203,7 @@ def movement(now: Exposure, effect: Effect) -> tuple[Array, Array]:
     return abs(np.diff(level, axis=1)).sum(axis=1, keepdims=True), np.ptp(level, axis=1, keepdims=True)
 
 
-def _sway(now: Exposure, effects: Sequence[Effect], factor: Array, common: Array) -> Sway | None:
+def _sway(now: ExposureBlock, effects: Sequence[Effect], factor: Floats, common: Floats) -> Sway | None:
     """How the references move within the frames besides factor and common (F or 1, H or 1, 1), which hold for each."""
     count = parts(now, effects)
     if count == 0:
@@ -219,7 +220,7 @@ def _sway(now: Exposure, effects: Sequence[Effect], factor: Array, common: Array
     return Sway(at, *(np.broadcast_to(wave, (*wave.shape[:2], nodes)) for wave in (factor, common)))
 
 
-def _nodes(parts: int, kinks: Sequence[float], early: Array) -> Array:
+def _nodes(parts: int, kinks: Sequence[float], early: Floats) -> Floats:
     """Ends of the parts of a frame, and twice each kink, (H or 1, n) ascending."""
     ends = np.arange(parts + 1)[None] / parts
     if not kinks:
@@ -231,7 +232,7 @@ def _nodes(parts: int, kinks: Sequence[float], early: Array) -> Array:
     return np.sort(np.concatenate([np.repeat(ends, len(moments), axis=0), moments, moments], axis=1), axis=1)
 
 
-def _beside(at: Array, part: float) -> Array:
+def _beside(at: Floats, part: float) -> Floats:
     """A moment beside each node, on the side on which it is of several nodes at the same moment."""
     middles = 0.5 * (at[:, 1:] + at[:, :-1])
     left = np.concatenate([at[:, :1] - 0.5 * part, middles], axis=1)
@@ -240,7 +241,7 @@ def _beside(at: Array, part: float) -> Array:
     return np.where(last, right, left)
 
 
-def read_out(now: Exposure, effects: Sequence[Effect], memory: Memory, spikes: Spikes) -> Spikes:
+def read_out(now: ExposureBlock, effects: Sequence[Effect], memory: Memory, spikes: Masks) -> Masks:
     """The bits reported (F, H, W) of those that fired; updates `memory`."""
     for effect in having("read_out", effects):
         spikes, memory[effect.name] = effect.read_out(spikes, now, memory[effect.name])

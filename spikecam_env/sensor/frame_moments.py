@@ -13,9 +13,8 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from spikecam_env.types import Floats
 
 _SMALL = 0.01
 """Angle a frame below which a series to its square is exact to 1e-10, and the closed forms lose as many digits."""
@@ -24,12 +23,12 @@ _SMALL = 0.01
 class Moments(NamedTuple):
     """(F, 1, 1) each: of what light is multiplied by, in every frame of a block; see the module's equation."""
 
-    mean: Array
-    tilt: Array
-    square: Array
+    mean: Floats
+    tilt: Floats
+    square: Floats
 
 
-def wave_moments(amplitude: float, cycles_per_frame: float, cycles_at_middle: Array) -> Moments:
+def wave_moments(amplitude: float, cycles_per_frame: float, cycles_at_middle: Floats) -> Moments:
     """Of 1 + amplitude sin(2 pi (cycles_at_middle + cycles_per_frame t)); exactly 1, 0, 1 at amplitude 0."""
     angle = 2.0 * math.pi * cycles_at_middle
     a = 2.0 * math.pi * cycles_per_frame
@@ -38,9 +37,9 @@ def wave_moments(amplitude: float, cycles_per_frame: float, cycles_at_middle: Ar
     return Moments(1.0 + float(np.sinc(cycles_per_frame)) * sine, 12.0 * first * cosine, 1.0 + 12.0 * second * sine)
 
 
-def mean_decay(frames_before: Array, tau: float) -> Array:
+def mean_decay(frames_before: Floats, tau: float) -> Floats:
     """Mean of exp(-t/tau) over the frame that begins so many frames after t = 0; tau [frames]."""
-    mean: Array = np.exp(-frames_before / tau) * (-math.expm1(-1.0 / tau) * tau)
+    mean: Floats = np.exp(-frames_before / tau) * (-math.expm1(-1.0 / tau) * tau)
     return mean
 
 

@@ -5,14 +5,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 
-import numpy as np
-from numpy.typing import NDArray
-
 from spikecam_env.sensor.effects.base import Effect
 from spikecam_env.sensor.kernels.ahead import same_light
 from spikecam_env.sensor.light import Segment
-
-Picture = NDArray[np.float32]
+from spikecam_env.types import Pictures
 
 
 class Imaging:
@@ -26,7 +22,7 @@ class Imaging:
     def __init__(self, effects: Sequence[Effect], shape: tuple[int, int]) -> None:
         self._optics = tuple(effect for effect in effects if effect.overrides("image"))
         self._shape = shape
-        self._known: list[tuple[Picture, Picture]] = []
+        self._known: list[tuple[Pictures, Pictures]] = []
 
     def __bool__(self) -> bool:
         return bool(self._optics)
@@ -42,7 +38,7 @@ class Imaging:
         stop = start if held else self.image(segment.radiance1)
         return replace(segment, radiance0=start, radiance1=stop, rise=rise, course=course)
 
-    def image(self, picture: Picture) -> Picture:
+    def image(self, picture: Pictures) -> Pictures:
         """The image (H*W,) of a picture (H*W,); the same array while the picture is the same."""
         for known, image in self._known:
             if same_light(known, picture):

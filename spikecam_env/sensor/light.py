@@ -204,7 +204,7 @@ def check_radiance(radiance: NDArray[np.float32]) -> None:
         raise InputError(f"radiance holds {what}; it must be finite and >= 0 (1.0 = one spike a frame)")
 
 
-class Course(NamedTuple):
+class LightWithinFrame(NamedTuple):
     """Light within a frame that holds keys: times (n,) in it, 0 .. 1, and the picture (H*W,) at each; linear
     between."""
 
@@ -242,7 +242,7 @@ class Segment:
     first: int
     count: int
     rise: NDArray[np.float32] | None = None
-    course: Course | None = None
+    course: LightWithinFrame | None = None
 
 
 def segments(
@@ -325,12 +325,12 @@ def _frame_with_keys(light: Keyframes, at: int) -> Segment:
     return Segment(held, held, 1, 0, 1, np.clip(rise, -2.0 * mean, 2.0 * mean).astype(np.float32))
 
 
-def course(light: Keyframes, frame: int) -> Course:
+def course(light: Keyframes, frame: int) -> LightWithinFrame:
     """Light within a frame."""
     after, until = np.searchsorted(light.frame, frame, side="right"), np.searchsorted(light.frame, frame + 1)
     times = np.concatenate([[0.0], light.frame[after:until] - frame, [1.0]])
     pictures = (light.at(frame), *light.radiance[after:until], light.at(frame + 1))
-    return Course(times, tuple(picture.reshape(-1) for picture in pictures))
+    return LightWithinFrame(times, tuple(picture.reshape(-1) for picture in pictures))
 
 
 def _held(picture: NDArray[np.float32], at: int, stop: int) -> Iterator[Segment]:

@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 from spikecam_env.checked import as_number
 from spikecam_env.errors import InputError, OwnCodeError, shown
 from spikecam_env.own_code import line_in, own_code
-from spikecam_env.sensor.effects.base import PACKAGE, Charge, Effect, Exposure, Feedback, Few, Shift
+from spikecam_env.sensor.effects.base import PACKAGE, Charge, Effect, ExposureBlock, Feedback, Few, Shift
 from spikecam_env.sensor.ranges import check_parameters
 from spikecam_env.sensor.unit import UNIT_RANGES, PixelArray
 
@@ -52,8 +52,8 @@ class Call:
     given: tuple[Any, ...]
 
     @property
-    def now(self) -> Exposure | None:
-        return next((value for value in self.given if isinstance(value, Exposure)), None)
+    def now(self) -> ExposureBlock | None:
+        return next((value for value in self.given if isinstance(value, ExposureBlock)), None)
 
     def frames(self) -> tuple[int, int]:
         """Number of the camera's first frame of the call, and how many there are; (0, 0) where none is known."""

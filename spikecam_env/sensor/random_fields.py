@@ -15,8 +15,8 @@ from spikecam_env.compiled import njit
 from spikecam_env.sensor.kernels.draws import GOLDEN, first_key, second_key, standard
 from spikecam_env.sensor.kernels.intrinsics import use_widest_vectors
 from spikecam_env.sensor.kernels.quantile import fitted_polynomial
+from spikecam_env.types import Pictures
 
-Field = NDArray[np.float32]
 Words = tuple[np.uint32, np.uint32]
 """What fixes every draw of a field."""
 
@@ -36,7 +36,7 @@ def words(rng: np.random.Generator) -> Words:
     return low, high
 
 
-def white_field(of: Words, sigma: float, first: int, frames: int, shape: tuple[int, int]) -> Field:
+def white_field(of: Words, sigma: float, first: int, frames: int, shape: tuple[int, int]) -> Pictures:
     """Independent N(0, sigma^2) numbers (frames, H, W) float32 of frames first .. first + frames."""
     out = np.empty((frames, shape[0] * shape[1]), dtype=np.float32)
     _white(*of, np.uint32(first % (1 << 32)), _normal(sigma), out)
@@ -46,12 +46,12 @@ def white_field(of: Words, sigma: float, first: int, frames: int, shape: tuple[i
 def octave_field(
     of: Sequence[Words],
     sigma: float,
-    value: Field,
+    value: Pictures,
     every: NDArray[np.float64],
     kept: NDArray[np.float64],
     first: int,
     frames: int,
-) -> tuple[Field, Field]:
+) -> tuple[Pictures, Pictures]:
     """The sum (frames, H, W) of AR(1) processes, and their values (octaves, H, W) after the last frame.
 
     sigma: standard deviation of each.  value: before frame `first`.  Process j moves in frames that every[j] divides:

@@ -22,12 +22,11 @@ from numpy.typing import NDArray
 
 from spikecam_env.sensor import drive
 from spikecam_env.sensor.crossing import MOST_AGAIN, NEVER, first_crossing
-from spikecam_env.sensor.effects.base import Effect, Exposure, having
+from spikecam_env.sensor.effects.base import Effect, ExposureBlock, having
 from spikecam_env.sensor.light import GRAINS, LEAST_LIMIT, MOST_GRAINS, Piece, Segment, on_grid, ramp
 from spikecam_env.sensor.model import generator
 from spikecam_env.sensor.unit import Unit
-
-Array = NDArray[np.float64]
+from spikecam_env.types import Floats
 
 
 @dataclass
@@ -38,16 +37,16 @@ class ReferenceState:
     arrived since, which it does without noise.  memory: what each effect remembers, by its name.
     """
 
-    charge: Array
-    threshold: Array
-    missed: Array
+    charge: Floats
+    threshold: Floats
+    missed: Floats
     rng: np.random.Generator
     frame: int
     memory: drive.Memory
 
 
 def start(
-    first: Exposure, effects: Sequence[Effect], phase: Array, seed: int, unit_seed: int | None = None
+    first: ExposureBlock, effects: Sequence[Effect], phase: Floats, seed: int, unit_seed: int | None = None
 ) -> ReferenceState:
     """Pixels part-way through a cycle: phase (P,) in [0, 1) is the share of the nominal threshold collected.
 
@@ -59,7 +58,7 @@ def start(
     return ReferenceState(np.floor(phase * GRAINS), threshold, np.zeros(phase.size), rng, first.number, memory)
 
 
-def run(first: Exposure, effects: Sequence[Effect], state: ReferenceState, segment: Segment) -> NDArray[np.uint8]:
+def run(first: ExposureBlock, effects: Sequence[Effect], state: ReferenceState, segment: Segment) -> NDArray[np.uint8]:
     """Advance `state` over a segment; returns spikes (count, P) uint8.  first, effects: as given to `start`."""
     light = ramp(segment, *first.unit.grains_per_frame)
     spikes = np.zeros((segment.count, first.unit.gain.size), dtype=np.uint8)
@@ -74,11 +73,11 @@ def run(first: Exposure, effects: Sequence[Effect], state: ReferenceState, segme
 
 
 def step(
-    now: Exposure,
+    now: ExposureBlock,
     effects: Sequence[Effect],
     state: ReferenceState,
-    mean: Array,
-    rise: Array,
+    mean: Floats,
+    rise: Floats,
     pieces: Sequence[Piece] = (),
 ) -> NDArray[np.bool_]:
     """One frame: `mean` (P,) is its expected charge [grains], which rises by `rise` (P,) from its start to its end, in
@@ -107,7 +106,7 @@ def step(
     return drive.read_out(now, effects, state.memory, fired[None]).reshape(-1)
 
 
-def spiked(effect: Effect, now: Exposure, state: ReferenceState, gained: Array, fired: NDArray[np.bool_]) -> None:
+def spiked(effect: Effect, now: ExposureBlock, state: ReferenceState, gained: Floats, fired: NDArray[np.bool_]) -> None:
     """What an effect does to the charge (P,) when it is known which pixels fired (H, W); gained: in the frame."""
     charge, rate = thresholds(state.charge, now), thresholds(gained, now)
     charge, state.memory[effect.name] = effect.spiked(charge, fired, rate, now, state.memory[effect.name])
@@ -115,10 +114,10 @@ def spiked(effect: Effect, now: Exposure, state: ReferenceState, gained: Array, 
 
 
 def crossed_again(
-    now: Exposure,
+    now: ExposureBlock,
     effects: Sequence[Effect],
     state: ReferenceState,
-    mean: Array,
+    mean: Floats,
     fired: NDArray[np.bool_],
     law: drive.Comparators,
 ) -> NDArray[np.bool_]:
@@ -133,12 +132,12 @@ def crossed_again(
     return again.reshape(now.shape)
 
 
-def thresholds(grains: Array, now: Exposure) -> Array:
+def thresholds(grains: Floats, now: ExposureBlock) -> Floats:
     """Charge (P,) [grains] as effects see it: (H, W) [thresholds]."""
     return (grains / GRAINS).reshape(now.shape)
 
 
-def collect(unit: Unit, mean: Array, dark: Array, missed: Array, rng: np.random.Generator) -> Array:
+def collect(unit: Unit, mean: Floats, dark: Floats, missed: Floats, rng: np.random.Generator) -> Floats:
     """Charge of a frame [grains] given its expectation: Poisson electrons, paper (3)-(4), or the mean itself."""
     if not unit.shot:
         return mean
@@ -148,8 +147,8 @@ def collect(unit: Unit, mean: Array, dark: Array, missed: Array, rng: np.random.
 
 
 def references(
-    now: Exposure, effects: Sequence[Effect], state: ReferenceState, law: drive.Comparators
-) -> Callable[[Array], Array]:
+    now: ExposureBlock, effects: Sequence[Effect], state: ReferenceState, law: drive.Comparators
+) -> Callable[[Floats], Floats]:
     """What the comparators compare with in this frame, as a function of the thresholds (P,) [grains]."""
     if not having("compare", effects) and not having("react", effects):
         return lambda threshold: np.maximum(threshold, LEAST_LIMIT)
@@ -157,14 +156,14 @@ def references(
 
 
 def compared_with(
-    now: Exposure,
+    now: ExposureBlock,
     effects: Sequence[Effect],
     state: ReferenceState,
     law: drive.Comparators,
-    factor: Array,
-    common: Array,
-    threshold: Array,
-) -> Array:
+    factor: Floats,
+    common: Floats,
+    threshold: Floats,
+) -> Floats:
     """What pixels of these thresholds compare with (P,) [grains], where factor and common (H or 1, 1) [mV] stand so."""
     factor, common = (np.broadcast_to(rows, now.shape).reshape(-1) for rows in (factor, common))
     limit = thresholds(threshold * factor + law.grains_per_mV * (common + law.field[0]), now)
@@ -174,11 +173,11 @@ def compared_with(
 
 
 def fire(
-    now: Exposure,
+    now: ExposureBlock,
     effects: Sequence[Effect],
     state: ReferenceState,
-    mean: Array,
-    compared_with: Callable[[Array], Array],
+    mean: Floats,
+    compared_with: Callable[[Floats], Floats],
 ) -> NDArray[np.bool_]:
     """Reset every pixel that is at its threshold until none is; returns which fired (P,)."""
     fired = np.zeros(mean.size, dtype=np.bool_)
@@ -194,7 +193,12 @@ def fire(
 
 
 def fire_in_turn(
-    now: Exposure, effects: Sequence[Effect], state: ReferenceState, mean: Array, gained: Array, law: drive.Comparators
+    now: ExposureBlock,
+    effects: Sequence[Effect],
+    state: ReferenceState,
+    mean: Floats,
+    gained: Floats,
+    law: drive.Comparators,
 ) -> NDArray[np.bool_]:
     """As `fire`, in the order of the moments at which pixels are at their references, which may move within the frame.
 
@@ -246,8 +250,8 @@ def fire_in_turn(
 
 
 def nodes(
-    now: Exposure, effects: Sequence[Effect], state: ReferenceState, law: drive.Comparators
-) -> tuple[list[list[float]], Callable[[Array], Array]]:
+    now: ExposureBlock, effects: Sequence[Effect], state: ReferenceState, law: drive.Comparators
+) -> tuple[list[list[float]], Callable[[Floats], Floats]]:
     """Moments of each row at which the references are known, n each, and what thresholds (P,) [grains] are compared
     with at each (n, P)."""
     sway = law.sway
@@ -265,11 +269,11 @@ def neighbours(pixel: int, shape: tuple[int, int]) -> list[int]:
 
 
 def reset(
-    now: Exposure,
+    now: ExposureBlock,
     effects: Sequence[Effect],
     state: ReferenceState,
-    mean: Array,
-    taken: Array | float,
+    mean: Floats,
+    taken: Floats | float,
     pixels: NDArray[np.intp],
 ) -> None:
     """Take that charge [grains] from pixels that fire; a held node misses light."""
@@ -280,7 +284,7 @@ def reset(
     state.charge[pixels] = residual * GRAINS
 
 
-def draw_threshold(kappa: Array, rng: np.random.Generator) -> Array:
+def draw_threshold(kappa: Floats, rng: np.random.Generator) -> Floats:
     """Thresholds [grains] after a reset, paper (12): 1 + kappa n; exactly one without noise, and draws nothing."""
     if not np.any(kappa):
         return np.full(kappa.shape, float(GRAINS))

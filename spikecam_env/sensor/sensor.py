@@ -18,7 +18,7 @@ from spikecam_env.errors import InputError, shown, unknown_name
 from spikecam_env.sensor import bent_light as bent
 from spikecam_env.sensor import reference
 from spikecam_env.sensor.drive import wants_pieces
-from spikecam_env.sensor.effects.base import Exposure
+from spikecam_env.sensor.effects.base import ExposureBlock
 from spikecam_env.sensor.imaging import Imaging
 from spikecam_env.sensor.kernels import ahead, block, fast
 from spikecam_env.sensor.kernels.stretches import stretches
@@ -227,8 +227,8 @@ class SpikeSensor:
         else:
             out[:] = reference.run(self._first_exposure(), self._frame_effects, self._pixels, segment)
 
-    def _first_exposure(self) -> Exposure:
-        return Exposure(0, self.model.frame_rate_hz, self.shape, self.unit)
+    def _first_exposure(self) -> ExposureBlock:
+        return ExposureBlock(0, self.model.frame_rate_hz, self.shape, self.unit)
 
 
 @dataclass(frozen=True)

@@ -18,6 +18,7 @@ from typing import Any, Literal
 
 from spikecam_env.checked import checked_shape, checked_whole
 from spikecam_env.errors import InputError, unknown_name
+from spikecam_env.renamed import old_names
 from spikecam_env.streams.packing import BitOrder, check_bit_order
 from spikecam_env.untrusted import Count, Declared, Positive, declared, read_json
 from spikecam_env.whole import write_text_whole
@@ -38,7 +39,7 @@ class SideFile(Declared):
 
 
 @dataclass(frozen=True)
-class Geometry:
+class FrameLayout:
     """How frames lie in a file.  source: where it is from: given, a side file's name, or usual."""
 
     height: int
@@ -86,7 +87,7 @@ def write_side_file(path: Path, entries: dict[str, Any]) -> None:
     write_text_whole(side, json.dumps(stated, indent=1) + "\n")
 
 
-def geometry(path: Path, given: dict[str, Any], usual: dict[str, Any]) -> Geometry:
+def geometry(path: Path, given: dict[str, Any], usual: dict[str, Any]) -> FrameLayout:
     """The geometry of a recording.
 
     given: the caller's options, None where he says nothing.  usual: height and width, and others, if nobody says.
@@ -112,7 +113,7 @@ def geometry(path: Path, given: dict[str, Any], usual: dict[str, Any]) -> Geomet
         raise InputError(f"flip is {taken['flip']!r}; it must be True or False")
     if taken.get("layout", "bits") not in ("bits", "packets"):
         raise unknown_name("layout", taken["layout"], ("bits", "packets"))
-    return Geometry(
+    return FrameLayout(
         height,
         width,
         taken["flip"],
@@ -122,3 +123,6 @@ def geometry(path: Path, given: dict[str, Any], usual: dict[str, Any]) -> Geomet
         taken.get("frame_rate_hz"),
         "given" if {"height", "width"} <= stated.keys() else found[1].name if found is not None else "usual",
     )
+
+
+__getattr__ = old_names(__name__, {"Geometry": "FrameLayout"})

@@ -27,10 +27,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from spikecam_env.errors import InputError, shown
+from spikecam_env.renamed import old_names
 from spikecam_env.streams.hdf5 import is_recording, open_recording
 from spikecam_env.streams.packing import pack_checked, packed_bytes, unpack_frames
 from spikecam_env.streams.recording import read_recording
-from spikecam_env.streams.side_file import Geometry, geometry
+from spikecam_env.streams.side_file import FrameLayout, geometry
 from spikecam_env.streams.vidar import USUAL, read_dat
 
 try:
@@ -92,7 +93,7 @@ class Source(Protocol):
 
 
 @dataclass
-class Stored:
+class StoredFrames:
     """Frames of a file.  fetch: fills rows with the frames from a number on.  loop: begin again at the end."""
 
     title: str
@@ -126,7 +127,7 @@ class Flowing:
     """
 
     title: str
-    taken: Geometry
+    taken: FrameLayout
     receive: Receive
     waits: bool = field(default=False, init=False)
     cut: str = field(default="", init=False)
@@ -178,7 +179,7 @@ def open_source(where: str, *, loop: bool = False, **options: Any) -> Iterator[S
             yield _stored(Path(where), loop, options, stack)
 
 
-def turned(packed: Packed, taken: Geometry) -> Packed:
+def turned(packed: Packed, taken: FrameLayout) -> Packed:
     """Frames as they lie in a file -> as this package packs them: columns kept, rows from the top, bits little-endian.
 
     packed: (T, ceil(height width / 8)) -> (T, ceil(height columns / 8)), columns being crop_width where it is given.
@@ -204,7 +205,7 @@ def is_flow(where: str) -> bool:
     return stat.S_ISFIFO(kind) or stat.S_ISSOCK(kind)
 
 
-def _whole_frames(receive: Receive, rows: Packed, taken: Geometry) -> tuple[int, int]:
+def _whole_frames(receive: Receive, rows: Packed, taken: FrameLayout) -> tuple[int, int]:
     """Fill rows, from the first on, with frames that have come, one at least; (frames, bytes of a frame that was cut by
     the end of the stream)."""
     size = packed_bytes(taken.shape)
@@ -219,15 +220,15 @@ def _whole_frames(receive: Receive, rows: Packed, taken: Geometry) -> tuple[int,
     return frames, rest
 
 
-def _lies_as_packed(taken: Geometry) -> bool:
+def _lies_as_packed(taken: FrameLayout) -> bool:
     return not taken.flip and taken.bit_order == "little" and _columns(taken) == taken.width
 
 
-def _columns(taken: Geometry) -> int:
+def _columns(taken: FrameLayout) -> int:
     return taken.width if taken.crop_width is None else taken.crop_width
 
 
-def _stored(path: Path, loop: bool, options: dict[str, Any], stack: ExitStack) -> Stored:
+def _stored(path: Path, loop: bool, options: dict[str, Any], stack: ExitStack) -> StoredFrames:
     ending = path.suffix.lower()
     if ending == ".dat":
         how = read_dat(path, count=1, **_only(options, (*FLOWING, "layout"), f"{ending} files"))[1]
@@ -243,11 +244,11 @@ def _stored(path: Path, loop: bool, options: dict[str, Any], stack: ExitStack) -
         rows[:] = packed[first : first + len(rows)]
 
     shape = (recording.spikes.shape[1], recording.spikes.shape[2])
-    return Stored(path.name, shape, recording.frame_rate_hz or FRAME_RATE_HZ, len(packed), fetch, loop)
+    return StoredFrames(path.name, shape, recording.frame_rate_hz or FRAME_RATE_HZ, len(packed), fetch, loop)
 
 
-def _dat_file(path: Path, loop: bool, how: dict[str, Any], stack: ExitStack) -> Stored:
-    taken = Geometry(
+def _dat_file(path: Path, loop: bool, how: dict[str, Any], stack: ExitStack) -> StoredFrames:
+    taken = FrameLayout(
         height=how["height"],
         width=how["width"],
         flip=how["flip"],
@@ -270,10 +271,10 @@ def _dat_file(path: Path, loop: bool, how: dict[str, Any], stack: ExitStack) -> 
             done += frames
 
     shape, frames = (taken.height, _columns(taken)), path.stat().st_size // size
-    return Stored(path.name, shape, taken.frame_rate_hz or FRAME_RATE_HZ, frames, fetch, loop)
+    return StoredFrames(path.name, shape, taken.frame_rate_hz or FRAME_RATE_HZ, frames, fetch, loop)
 
 
-def _own_recording(path: Path, loop: bool, stack: ExitStack) -> Stored:
+def _own_recording(path: Path, loop: bool, stack: ExitStack) -> StoredFrames:
     recording = stack.enter_context(open_recording(path))
     frames = recording.frames("spikes")
     if not frames:
@@ -283,7 +284,7 @@ def _own_recording(path: Path, loop: bool, stack: ExitStack) -> Stored:
         rows[:] = recording.read("spikes", slice(first, first + len(rows)))
 
     rate = recording.attributes.get("frame_rate_hz") or FRAME_RATE_HZ
-    return Stored(path.name, recording.shape, rate, frames, fetch, loop)
+    return StoredFrames(path.name, recording.shape, rate, frames, fetch, loop)
 
 
 def _flowing(where: str, options: dict[str, Any], stack: ExitStack) -> Flowing:
@@ -343,3 +344,6 @@ def _only(options: dict[str, Any], allowed: tuple[str, ...], what: str) -> dict[
             rest = f"; they take {', '.join(allowed)}" if allowed else ""
             raise InputError(f"option {name} does not apply to {what}{rest}")
     return options
+
+
+__getattr__ = old_names(__name__, {"Stored": "StoredFrames"})

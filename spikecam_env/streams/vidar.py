@@ -29,7 +29,7 @@ from spikecam_env.streams import packets
 from spikecam_env.streams.files import check_range
 from spikecam_env.streams.geometry import KNOWN_SHAPES, geometry_doubt, looks_right
 from spikecam_env.streams.packing import BitOrder, as_spikes, check_values, pack_checked, packed_bytes, unpack_frames
-from spikecam_env.streams.side_file import Geometry, Layout, geometry, write_side_file
+from spikecam_env.streams.side_file import FrameLayout, Layout, geometry, write_side_file
 from spikecam_env.untrusted import existing_file
 from spikecam_env.whole import whole_file
 
@@ -154,7 +154,7 @@ def save_vidar_dat(
             write_side_file(Path(path), {**entries, "frame_rate_hz": frame_rate_hz})
 
 
-def _from_bits(source: Path, taken: Geometry, first: int, count: int | None) -> NDArray[np.uint8]:
+def _from_bits(source: Path, taken: FrameLayout, first: int, count: int | None) -> NDArray[np.uint8]:
     size = packed_bytes(taken.shape)
     frames = _whole_frames(source, size, taken)
     first, stop = check_range(first, count, frames, str(source))
@@ -170,7 +170,7 @@ def _from_bits(source: Path, taken: Geometry, first: int, count: int | None) -> 
     return unpack_frames(packed, taken.shape, bit_order=taken.bit_order)
 
 
-def _from_packets(source: Path, taken: Geometry, first: int, count: int | None) -> NDArray[np.uint8]:
+def _from_packets(source: Path, taken: FrameLayout, first: int, count: int | None) -> NDArray[np.uint8]:
     if taken.shape != packets.SHAPE:
         raise InputError(
             f"{source}: packets are of 1000 x 1000 pixels, not {taken.height} x {taken.width}; leave height and width"
@@ -180,7 +180,7 @@ def _from_packets(source: Path, taken: Geometry, first: int, count: int | None) 
     return packets.read_frames(source, offset, first, stop - first)
 
 
-def _turned(spikes: NDArray[np.uint8], taken: Geometry) -> NDArray[np.uint8]:
+def _turned(spikes: NDArray[np.uint8], taken: FrameLayout) -> NDArray[np.uint8]:
     spikes = spikes[:, :, : taken.crop_width]
     return np.ascontiguousarray(spikes[:, ::-1] if taken.flip else spikes)
 
@@ -196,7 +196,7 @@ def _read(source: Path, offset: int, size: int) -> NDArray[np.uint8]:
     return read
 
 
-def _whole_frames(source: Path, frame: int, taken: Geometry) -> int:
+def _whole_frames(source: Path, frame: int, taken: FrameLayout) -> int:
     """Whole frames of `frame` bytes in a file; warns where the last one is cut."""
     size = source.stat().st_size
     frames, rest = divmod(size, frame)
@@ -222,7 +222,7 @@ def _whole_frames(source: Path, frame: int, taken: Geometry) -> int:
     )
 
 
-def _doubt_of(source: Path, taken: Geometry) -> str:
+def _doubt_of(source: Path, taken: FrameLayout) -> str:
     seen = source.stat()
     return _doubt(str(source), seen.st_mtime_ns, seen.st_size, taken.shape, taken.bit_order)
 

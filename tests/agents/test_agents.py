@@ -19,7 +19,7 @@ from spikecam_env.agents import study as studies
 from spikecam_env.agents.agent import Agent, shipped
 from spikecam_env.agents.history import History
 from spikecam_env.agents.playing import score_of
-from spikecam_env.agents.policy import LOG_SIGMA, Recipe
+from spikecam_env.agents.policy import LOG_SIGMA, PolicyRecipe
 from spikecam_env.agents.ppo import PPO, _gain
 from spikecam_env.agents.tracker import Tracker
 from spikecam_env.agents.training import Study, agents_along, learner, train_agent
@@ -44,7 +44,7 @@ def test_a_history_has_pictures_and_motion_by_their_lags_and_starts_over_with_an
 
 
 def test_the_place_of_a_map_is_where_it_is_high() -> None:
-    policy = Recipe(channels=1, shape=(32, 32), high=255, lags=(0,), actions=1, maps=1).network()
+    policy = PolicyRecipe(channels=1, shape=(32, 32), high=255, lags=(0,), actions=1, maps=1).network()
     maps = torch.zeros(1, 1, 9, 9)
     maps[0, 0, 6, 2] = 20.0
     x, y, _ = policy._places(maps)[0].tolist()
@@ -53,7 +53,7 @@ def test_the_place_of_a_map_is_where_it_is_high() -> None:
 
 def test_maps_of_any_scale_give_the_same_action_and_pass_the_gradient_on() -> None:
     torch.manual_seed(0)
-    policy = Recipe(channels=1, shape=(32, 32), high=255, lags=(0,), actions=1).network()
+    policy = PolicyRecipe(channels=1, shape=(32, 32), high=255, lags=(0,), actions=1).network()
     pictures, state = torch.randint(0, 256, (8, 1, 32, 32), dtype=torch.uint8), torch.zeros(8, 3)
 
     def taught() -> tuple[torch.Tensor, float]:
@@ -72,7 +72,7 @@ def test_maps_of_any_scale_give_the_same_action_and_pass_the_gradient_on() -> No
 
 
 def test_an_agent_that_is_to_read_rarely_says_something_before_it_learns() -> None:
-    recipe = Recipe(channels=1, shape=(32, 32), high=255, lags=(0,), actions=7, answers=4)
+    recipe = PolicyRecipe(channels=1, shape=(32, 32), high=255, lags=(0,), actions=7, answers=4)
     mean = recipe.network().mean.bias.detach()
     said = 1 - float(torch.distributions.Normal(mean[2], torch.tensor(LOG_SIGMA).exp()).cdf(torch.tensor(0.0)))
     print(f"an answer by chance in {100 * said:.1f} % of the steps")
@@ -130,7 +130,7 @@ def test_who_imitates_plays_without_noise_and_comes_to_act_like_the_oracle(tmp_p
 
 def test_an_agent_acts_for_many_as_for_each(tmp_path: Path) -> None:
     torch.manual_seed(0)
-    policy = Recipe(channels=1, shape=(4, 4), high=255, lags=(0, 1), actions=1, pool=1).network()
+    policy = PolicyRecipe(channels=1, shape=(4, 4), high=255, lags=(0, 1), actions=1, pool=1).network()
     with torch.no_grad():
         policy.mean.weight.mul_(100)
     many, one = (Agent("Catch-v1", "tfp", policy) for _ in range(2))
@@ -157,7 +157,7 @@ def test_a_file_that_is_no_agent_is_refused(source: str, tmp_path: Path, monkeyp
 
 
 def test_an_agent_refuses_what_it_does_not_see() -> None:
-    agent = Agent("Catch-v1", "tfp", Recipe(channels=1, shape=(8, 8), high=255, lags=(0,), actions=1).network())
+    agent = Agent("Catch-v1", "tfp", PolicyRecipe(channels=1, shape=(8, 8), high=255, lags=(0,), actions=1).network())
     with pytest.raises(InputError, match="obs_state"):
         agent.act(np.zeros((1, 8, 8), np.uint8))  # type: ignore[arg-type]
     with pytest.raises(InputError, match="tfp"):
@@ -259,7 +259,7 @@ def test_one_training_is_played_at_every_light(tmp_path: Path) -> None:
 
 
 def test_a_study_plays_the_agent_that_comes_with_the_package(tmp_path: Path) -> None:
-    (result,) = studies.measure([studies.Case(task="Catch-v1", sight="shipped", episodes=5)], tmp_path)
+    (result,) = studies.measure([studies.StudyRun(task="Catch-v1", sight="shipped", episodes=5)], tmp_path)
     agent = Agent.load("Catch-v1")
     env = agent.make(split="test")
     assert result.score == score_of(agent, env, 5) > 0

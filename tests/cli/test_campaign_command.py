@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from spikecam_env.campaign import read_campaign
-from spikecam_env.cli.camera import Camera
+from spikecam_env.cli.camera import CameraOptions
 from spikecam_env.cli.main import run
 from spikecam_env.sensor import CATALOGUE, SensorModel
 from spikecam_env.streams import load_vidar_dat, save_npz
@@ -68,7 +68,7 @@ def test_every_effect_is_an_option_with_all_its_parameters(name: str, capsys) ->
         for line in capsys.readouterr().out.splitlines()
         if line.split()[0] == name or line.startswith(f"{name}:")
     )
-    effect = next(e for e in Camera(model="ideal", effect=(option,)).load().effects)
+    effect = next(e for e in CameraOptions(model="ideal", effect=(option,)).load().effects)
     for f in fields(effect):
         given = getattr(effect, f.name)
         assert type(given) is type(f.default)

@@ -16,7 +16,7 @@ import pytest
 
 from scenes import RotatingDisk
 from spikecam_env.cli.live.live_screen import LiveScreen
-from spikecam_env.cli.live.simulated import Simulated
+from spikecam_env.cli.live.simulated import SimulatedSource
 from spikecam_env.cli.main import run
 from spikecam_env.cli.panels import MARGIN, display
 from spikecam_env.sensor import SpikeSensor
@@ -194,7 +194,7 @@ def test_a_scene_is_simulated_no_faster_than_its_speed(capsys) -> None:
 
 
 def test_a_simulated_source_gives_the_sensors_frames(spikes: np.ndarray) -> None:
-    source = Simulated("disk", RotatingDisk(SHAPE), SpikeSensor("scsim", SHAPE, 0), speed=1e6)
+    source = SimulatedSource("disk", RotatingDisk(SHAPE), SpikeSensor("scsim", SHAPE, 0), speed=1e6)
     rows = np.empty((512, 120), np.uint8)
     done = 0
     while done < 512:

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from spikecam_env.cli.main import run
-from spikecam_env.cli.reading import Reading
+from spikecam_env.cli.reading import ReadingOptions
 from spikecam_env.streams import save_vidar_dat
 
 
@@ -19,8 +19,8 @@ def regular(shape: tuple[int, int] = (24, 32), frames: int = 60) -> np.ndarray:
 
 
 def test_only_what_was_given_is_passed_on() -> None:
-    assert Reading().options() == {}
-    assert Reading(height=24, flip=True, item=0).options() == {"height": 24, "flip": True, "item": 0}
+    assert ReadingOptions().options() == {}
+    assert ReadingOptions(height=24, flip=True, item=0).options() == {"height": 24, "flip": True, "item": 0}
 
 
 def test_denoise_prints_the_geometry_it_took(tmp_path: Path, capsys) -> None:

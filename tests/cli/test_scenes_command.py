@@ -9,7 +9,7 @@ import pytest
 
 from scenes.catalogue import SCENES
 from spikecam_env.cli.main import run
-from spikecam_env.cli.panels import BACKGROUND, MARGIN, Panel, compose, write_film
+from spikecam_env.cli.panels import BACKGROUND, MARGIN, PicturePanel, compose, write_film
 from spikecam_env.streams import read_recording
 
 SIZE = ("--size", "24", "40")
@@ -108,6 +108,6 @@ def test_a_film_of_any_size_has_every_pixel(shape: tuple[int, int], tmp_path: Pa
 
 @pytest.mark.parametrize("width", [1, 7, 31, 63])
 def test_panels_have_even_sides_and_room_for_their_margin(width: int) -> None:
-    white = compose([Panel(np.ones((width, width)), "")], 1.0)
+    white = compose([PicturePanel(np.ones((width, width)), "")], 1.0)
     assert white.shape[0] % 2 == white.shape[1] % 2 == 0
     assert (white[:, -MARGIN:] == BACKGROUND).all()

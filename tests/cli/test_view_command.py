@@ -15,7 +15,7 @@ import pytest
 from denoiser import OnlineDnSS
 from scenes.catalogue import make_scene
 from spikecam_env.cli.live.streams import Block, Stream, of_recording, of_scene
-from spikecam_env.cli.live.timeline import DENOISED, NOISY, TARGET, Entry, entries
+from spikecam_env.cli.live.timeline import DENOISED, NOISY, TARGET, TimelineEntry, entries
 from spikecam_env.cli.main import run
 from spikecam_env.cli.panels import display
 from spikecam_env.sensor import SpikeSensor
@@ -39,7 +39,7 @@ def stream(block: np.ndarray, every: int, **figures: float) -> Stream:
     return Stream("made up", SHAPE, 40_000.0, len(block), blocks)
 
 
-def by_path(found: list[Entry]) -> dict[str, list[Entry]]:
+def by_path(found: list[TimelineEntry]) -> dict[str, list[TimelineEntry]]:
     ordered = sorted(found, key=lambda entry: entry.path)
     return {path: list(group) for path, group in groupby(ordered, key=lambda entry: entry.path)}
 
@@ -91,9 +91,9 @@ def test_a_recording_and_a_scene_are_cut_into_blocks(tmp_path: Path) -> None:
 
 
 @pytest.fixture
-def sent(monkeypatch: pytest.MonkeyPatch) -> list[tuple[str, float, list[Entry]]]:
+def sent(monkeypatch: pytest.MonkeyPatch) -> list[tuple[str, float, list[TimelineEntry]]]:
     """What the command gives to rerun, which stays out of it."""
-    given: list[tuple[str, float, list[Entry]]] = []
+    given: list[tuple[str, float, list[TimelineEntry]]] = []
 
     def recorded(title: str, frame_rate_hz: float, found: Any) -> bytes:
         given.append((title, frame_rate_hz, list(found)))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from spikecam_env.datasets import Entry, Plan
+from spikecam_env.datasets import Plan, PlannedScene
 
 SHAPE = (32, 48)
 LONG = 2000
@@ -13,9 +13,9 @@ LONG = 2000
 
 def small_plan(frames: int = 200, **settings) -> Plan:
     entries = (
-        Entry("train/000.h5", "collage", 11, 12),
-        Entry("train/001.h5", "collage", 21, 22),
-        Entry("test/disk.h5", "disk", 31, 32),
+        PlannedScene("train/000.h5", "collage", 11, 12),
+        PlannedScene("train/001.h5", "collage", 21, 22),
+        PlannedScene("test/disk.h5", "disk", 31, 32),
     )
     return Plan(
         "small", entries, shape=SHAPE, frames=frames, **{"seed": 3, "truth_every": 50, "renderer": "embree", **settings}

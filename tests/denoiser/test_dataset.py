@@ -14,14 +14,18 @@ from torch.utils.data import DataLoader
 
 from denoiser.dataset import SpikeWindows
 from denoiser.pairs import WARM_UP
-from spikecam_env.datasets import Entry, Plan, build
+from spikecam_env.datasets import Plan, PlannedScene, build
 from spikecam_env.errors import InputError
 from spikecam_env.streams import isi_plane, read_recording
 
 FRAMES = 200
 PLAN = Plan(
     "small",
-    (Entry("train/a.h5", "collage", 1, 2), Entry("train/b.h5", "disk", 3, 4), Entry("test/a.h5", "collage", 5, 6)),
+    (
+        PlannedScene("train/a.h5", "collage", 1, 2),
+        PlannedScene("train/b.h5", "disk", 3, 4),
+        PlannedScene("test/a.h5", "collage", 5, 6),
+    ),
     shape=(32, 48),
     frames=FRAMES,
     truth_every=0,

@@ -12,7 +12,7 @@ from denoiser.interval_training import LOOK_AHEAD, IntervalWindows, inverse_inte
 from denoiser.network import DnSS
 from denoiser.pairs import WARM_UP
 from denoiser.recipe import RECIPES
-from denoiser.simulated import Simulated
+from denoiser.simulated import StreamBlock
 from spikecam_env.streams import isi_planes
 
 LAYOUT = RECIPES["paper"].layout
@@ -104,7 +104,7 @@ def test_young_streams_teach_nothing(bank, monkeypatch):
 
     def begun(frames, rows):
         part = advance(frames, rows)
-        return Simulated(part.spikes, part.light, torch.ones_like(part.begins))
+        return StreamBlock(part.spikes, part.light, torch.ones_like(part.begins))
 
     monkeypatch.setattr(windows.streams, "advance", begun)
     assert float(windows.loss(Same(), 15)) == 0 and set(windows.errors(Same(), 15).values()) == {0.0}

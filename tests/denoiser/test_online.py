@@ -10,7 +10,7 @@ import pytest
 import torch
 
 from denoiser import infer
-from denoiser.chain import Chain
+from denoiser.chain import PassChain
 from denoiser.number_type import number_type
 from denoiser.online import OnlineDnSS, denoise
 from denoiser.recipe import RECIPES
@@ -361,7 +361,7 @@ def test_overlapping_passes_are_the_mean_of_two_chains():
     later = np.concatenate(
         [
             alone[:8],
-            *(rates for _, rates in _passes(Chain(recipe, network, number_type("auto"), SHAPE, first=8), spikes)),
+            *(rates for _, rates in _passes(PassChain(recipe, network, number_type("auto"), SHAPE, first=8), spikes)),
         ]
     )
     place = np.arange(90) % 16 + 0.5

@@ -11,13 +11,13 @@ import torch
 from denoiser import training_loop
 from denoiser.reconstruct import lessons, spk2imgnet, ssml
 from denoiser.reconstruct import train as training
-from denoiser.reconstruct.lessons import Windows, lesson_of
+from denoiser.reconstruct.lessons import LessonWindows, lesson_of
 from denoiser.reconstruct.recipe import LEARNED, WIDTH_STEP, reconstructor_recipe
 from denoiser.reconstruct.rolling import RollingWindows
 from denoiser.reconstruct.train import ReconstructorConfig, train_reconstructor
 from denoiser.reconstruct.weights import load_reconstructor
 from denoiser.run import Run
-from denoiser.simulated import TWINS, Bank, Simulated
+from denoiser.simulated import TWINS, Bank, StreamBlock
 from spikecam_env.errors import InputError
 from spikecam_env.streams import isi_plane
 
@@ -38,7 +38,7 @@ class Flats:
         begins[self.renewed] = True
         light = self.rate.expand(shape).contiguous()
         spikes = {"noisy": (drawn < 2 * light).byte(), "clean": (drawn < light).byte()}
-        return Simulated({twin: spikes[twin] for twin in self.twins}, light, begins)
+        return StreamBlock({twin: spikes[twin] for twin in self.twins}, light, begins)
 
 
 class NoBank:
@@ -72,7 +72,7 @@ def windows_of(span, seed=0):
     """Full windows of a few flats."""
     flats = Flats(4, 16, seed=seed)
     part = flats.advance(span)
-    return Windows(part.clean, part.light, torch.ones(4, dtype=torch.bool))
+    return LessonWindows(part.clean, part.light, torch.ones(4, dtype=torch.bool))
 
 
 @pytest.mark.parametrize("mode", LEARNED)
@@ -110,7 +110,7 @@ def test_ssml_does_not_see_the_light():
     torch.manual_seed(0)
     lesson = lesson_of(reconstructor_recipe("ssml", WIDTH_STEP))
     windows = windows_of(lesson.span)
-    other = Windows(windows.spikes, torch.rand_like(windows.light), windows.old)
+    other = LessonWindows(windows.spikes, torch.rand_like(windows.light), windows.old)
     assert torch.equal(lesson.losses(windows, torch.float32), lesson.losses(other, torch.float32))
 
 

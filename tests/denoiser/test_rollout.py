@@ -9,7 +9,7 @@ from torch import nn
 from denoiser import rollout
 from denoiser.recipe import RECIPES
 from denoiser.rollout import Rollouts
-from denoiser.simulated import Simulated
+from denoiser.simulated import StreamBlock
 from denoiser.stream_network import CARRY
 
 LAYOUT = RECIPES["best"].layout
@@ -33,7 +33,7 @@ class Flats:
         self.fresh = False
         spikes = torch.zeros((len(rows), frames, self.patch, self.patch), dtype=torch.uint8)
         spikes[:, :: round(1 / self.light)] = 1
-        return Simulated({"noisy": spikes}, torch.full(spikes.shape, self.light), begins)
+        return StreamBlock({"noisy": spikes}, torch.full(spikes.shape, self.light), begins)
 
     def unit(self, rows):
         shape = (len(rows), self.patch, self.patch)

@@ -11,16 +11,16 @@ from denoiser.pixel_map import PixelMap
 from denoiser.recipe import RECIPES
 from denoiser.side_by_side import side_by_side
 from denoiser.strips import ROWS
-from denoiser.window import RollingWindow, Window
+from denoiser.window import PassWindow, RollingWindow
 from spikecam_env.threads import as_many_as_pay
 
 BEST = RECIPES["best"]
 
 
-def window(span: int, layers: int, shape: tuple[int, int], seed: int = 0) -> Window:
+def window(span: int, layers: int, shape: tuple[int, int], seed: int = 0) -> PassWindow:
     rng = np.random.default_rng(seed)
     spikes = (rng.random((span, *shape)) < 0.3).astype(np.uint8)
-    return Window(0, 1, spikes, rng.normal(size=(layers, *shape)).astype(np.float32))
+    return PassWindow(0, 1, spikes, rng.normal(size=(layers, *shape)).astype(np.float32))
 
 
 @pytest.mark.parametrize("number_type", [torch.bfloat16, torch.float32])

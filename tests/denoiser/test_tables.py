@@ -12,20 +12,20 @@ import pytest
 import torch
 
 from denoiser.evaluate import exposed, still, tables, work
-from denoiser.evaluate.exposed import Case
+from denoiser.evaluate.exposed import StreamCase
 from denoiser.evaluate.figures import figures
-from denoiser.evaluate.judge import Record, Score
+from denoiser.evaluate.judge import PictureScore, RowResult
 from denoiser.evaluate.rows import ROWS, Weights, why_not
 from denoiser.evaluate.table_report import report
 from denoiser.evaluate.table_summary import groups, mean_and_spread
-from denoiser.evaluate.tables import TABLES, Asked, evaluate_table
+from denoiser.evaluate.tables import TABLES, TableRequest, evaluate_table
 from denoiser.pixel_map import PixelMap
 from spikecam_env.datasets import build, phm_n
 from spikecam_env.errors import InputError
 from spikecam_env.sensor import SensorModel, SpikeSensor
 from spikecam_env.streams import middleTFP
 
-SMALL = Asked(
+SMALL = TableRequest(
     scenes=("disk",), shape=(32, 48), seeds=2, frames=200, rows=("noisy", "tfp", "clean", "light", "light-mus")
 )
 CLASSICAL = ("tfp21", "tfp41", "tfi")
@@ -100,7 +100,7 @@ class Counted:
         self.tasks: list[tuple[str, int, str]] = []
         self.fail_at = fail_at
 
-    def __call__(self, task: work.Task) -> list[Record]:
+    def __call__(self, task: work.WorkItem) -> list[RowResult]:
         if len(self.tasks) == self.fail_at:
             raise KeyboardInterrupt
         self.tasks.append((task.case.scene, task.case.seed, task.source))
@@ -110,7 +110,7 @@ class Counted:
 DO = work.do
 
 
-def run(monkeypatch: pytest.MonkeyPatch, asked: Asked, fail_at: int | None = None) -> list[tuple[str, int, str]]:
+def run(monkeypatch: pytest.MonkeyPatch, asked: TableRequest, fail_at: int | None = None) -> list[tuple[str, int, str]]:
     """The tasks that were done for a table."""
     counted = Counted(fail_at)
     monkeypatch.setattr(work, "do", counted)
@@ -225,7 +225,7 @@ def test_real_recordings_are_judged_by_niqe_or_named_as_absent(tmp_path: Path) -
 
 
 def test_at_rest_the_mean_of_clean_frames_is_the_light_and_that_of_noisy_ones_has_the_fixed_pattern() -> None:
-    found = evaluate_table("still", Asked(still_scenes=1, seeds=1, shape=(40, 40), rows=("noisy", "clean")))
+    found = evaluate_table("still", TableRequest(still_scenes=1, seeds=1, shape=(40, 40), rows=("noisy", "clean")))
     rows = found["groups"][0]["rows"]
     print({row: m["mean_db"] for row, m in rows.items()})
     assert rows["clean"]["mean_db"] > 45 > 35 > rows["noisy"]["mean_db"]
@@ -260,10 +260,10 @@ def test_the_spread_is_over_seeds_of_the_mean_over_scenes() -> None:
     assert mean_and_spread([(0, None)]) == (None, None)
 
 
-def record(row: str, scene: str, db: dict[str, float], niqe: float | None = None, **measures: float) -> Record:
-    pictures = {column: Score(db=level, ssim=0.5) for column, level in db.items()}
-    pictures |= {} if niqe is None else {"tfi": Score(niqe=niqe)}
-    return Record(
+def record(row: str, scene: str, db: dict[str, float], niqe: float | None = None, **measures: float) -> RowResult:
+    pictures = {column: PictureScore(db=level, ssim=0.5) for column, level in db.items()}
+    pictures |= {} if niqe is None else {"tfi": PictureScore(niqe=niqe)}
+    return RowResult(
         scene=scene, seed=0, interval=10.0, speed=0.0, row=row, weights={}, pictures=pictures, **measures
     )  # fmt: skip
 
@@ -307,7 +307,7 @@ def test_naturalness_counts_downwards() -> None:
 
 def test_the_calibration_of_a_still_scene_is_of_the_camera_before_it() -> None:
     """Against the rates of the same camera before even light: its gain and dark explain nearly all of their spread."""
-    case = Case("still", "bright 0", 3, (24, 32), 400)
+    case = StreamCase("still", "bright 0", 3, (24, 32), 400)
     found = PixelMap.of(still.calibrated(case))
     camera = SpikeSensor(SensorModel.preset("scsim"), case.shape, still.unit_seed(case))
     rate = camera.step(np.full(case.shape, 0.3, np.float32), 4000).mean(axis=0)

@@ -16,7 +16,7 @@ from denoiser.recipe import RECIPES
 from denoiser.reconstruct.train import ReconstructorConfig
 from denoiser.run import Run
 from denoiser.simulated import Bank
-from denoiser.train import Judge, TrainConfig, train
+from denoiser.train import TrainConfig, Validator, train
 from denoiser.training_record import command
 from denoiser.weights import load_weights, pretrained_path
 from spikecam_env.errors import InputError
@@ -81,7 +81,7 @@ def test_a_validation_changes_nothing_in_the_weights(small, tmp_path):
 
 def test_the_judge_is_the_same_at_every_validation(small):
     torch.manual_seed(0)
-    network, judge = RECIPES["best"].network().train(), Judge(RECIPES["best"], 7, torch.device("cpu"), 3)
+    network, judge = RECIPES["best"].network().train(), Validator(RECIPES["best"], 7, torch.device("cpu"), 3)
     first, again = judge.scores(network), judge.scores(network)
     print(first)
     assert first == again and network.training and set(first) == {"network_db", "mapped_db", "interval_db", "mean_db"}

@@ -9,7 +9,7 @@ import torch
 from denoiser.pixel_map import PixelMap
 from denoiser.recipe import RECIPES
 from denoiser.window import RollingWindow, WindowLayout
-from denoiser.window_torch import Windows, learned, pushed
+from denoiser.window_torch import StreamWindows, learned, pushed
 from spikecam_env.errors import InputError
 
 LAYOUT = RECIPES["best"].layout
@@ -47,7 +47,7 @@ def test_every_plane_is_that_of_the_rolling_window():
 
 def in_torch(spikes, rates, gain, dark) -> list[tuple[np.ndarray, np.ndarray]]:
     """(frames, planes) of all streams, pass by pass."""
-    windows, found = Windows.begin(LAYOUT, len(BEGINS), SHAPE, torch.device("cpu")), []
+    windows, found = StreamWindows.begin(LAYOUT, len(BEGINS), SHAPE, torch.device("cpu")), []
     windows.gain, windows.dark, windows.mapped = torch.from_numpy(gain), torch.from_numpy(dark), MAPPED
     for number in range(PASSES):
         new = torch.from_numpy(spikes[:, number * LAYOUT.planes : (number + 1) * LAYOUT.planes])
@@ -59,7 +59,7 @@ def in_torch(spikes, rates, gain, dark) -> list[tuple[np.ndarray, np.ndarray]]:
 
 
 def test_streams_can_be_taken_and_put_back():
-    windows = Windows.begin(LAYOUT, 3, SHAPE, torch.device("cpu"))
+    windows = StreamWindows.begin(LAYOUT, 3, SHAPE, torch.device("cpu"))
     rows = torch.tensor([2, 0])
     some = windows.rows(rows)
     some.gain[0], some.start[1] = 5.0, 32
@@ -71,4 +71,4 @@ def test_streams_can_be_taken_and_put_back():
 @pytest.mark.parametrize("layout", [WindowLayout(16, 16, 8), WindowLayout(20, 16, 16), WindowLayout()])
 def test_a_layout_that_cannot_begin_a_pass_early_is_refused(layout):
     with pytest.raises(InputError, match="future must be planes"):
-        Windows.begin(layout, 1, SHAPE, torch.device("cpu"))
+        StreamWindows.begin(layout, 1, SHAPE, torch.device("cpu"))

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 import spikecam_env.envs  # noqa: F401
-from spikecam_env.envs.course import Course, steps_of
+from spikecam_env.envs.course import StepOutcome, steps_of
 from spikecam_env.envs.oracle import oracle
 from spikecam_env.envs.registration import ENVIRONMENTS, SMALL_TASKS, TASK_NAMES
 
@@ -18,7 +18,7 @@ SEEDS = (0,)
 """Of the episodes that are played at every scene id: what differs is the motion of the scene."""
 
 
-def nothing(course: Course) -> Any:
+def nothing(course: StepOutcome) -> Any:
     return np.zeros(course.drive.axes, np.float32)
 
 

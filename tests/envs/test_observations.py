@@ -16,9 +16,9 @@ from spikecam_env.envs.observations import (
     TFI,
     TFP,
     Blocks,
+    CameraView,
     FrameCamera,
     Observation,
-    View,
     observation,
     restarted,
 )
@@ -31,7 +31,7 @@ from spikecam_env.streams import isi_plane, unpack_frames
 register()
 DISK = "spikecam_env/RotatingDisk-v0"
 SMALL: dict[str, Any] = {"shape": (16, 16), "frames_per_step": 8}
-VIEW = View((5, 7), 8)
+VIEW = CameraView((5, 7), 8)
 FRAMES = 48
 
 
@@ -43,7 +43,7 @@ def stream(seed: int = 0) -> np.ndarray:
 
 def shown(law: Observation, spikes: np.ndarray, cut: int) -> list[np.ndarray]:
     """What is seen after every `cut` frames."""
-    state, seen = law.start(View(VIEW.shape, cut), len(spikes)), []
+    state, seen = law.start(CameraView(VIEW.shape, cut), len(spikes)), []
     for first in range(0, spikes.shape[1], cut):
         picture, state = law.step(Blocks(spikes[:, first : first + cut]), state)
         seen.append(picture)
@@ -179,7 +179,7 @@ def test_a_dim_rate_is_the_same_plane_ten_times_brighter() -> None:
 
 @pytest.mark.parametrize("obs", ["tfp", "isi", "rate", "frame1000"])
 def test_one_stream_begins_anew_while_another_goes_on(obs: str) -> None:
-    law, view = observation(obs), View((8, 8), 20)
+    law, view = observation(obs), CameraView((8, 8), 20)
     rng = np.random.default_rng(0)
     light = Keyframes(np.zeros(1), np.full((1, 8, 8), 0.3, np.float32))
     blocks = [Blocks((rng.random((2, 20, 8, 8)) < 0.3).astype(np.uint8), [light] * 2) for _ in range(6)]

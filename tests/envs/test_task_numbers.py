@@ -16,9 +16,9 @@ import numpy as np
 import pytest
 
 from scenes.catalogue import unexposed_scene
-from scenes.discs import Path
+from scenes.discs import PiecewisePath
 from spikecam_env.envs import aiming, passes, scene, task
-from spikecam_env.envs.course import Course, Drive, steps_of
+from spikecam_env.envs.course import Drive, StepOutcome, steps_of
 from spikecam_env.envs.episode import Episode
 from spikecam_env.envs.motor import Motor
 from spikecam_env.envs.oracle import oracle
@@ -40,14 +40,14 @@ from spikecam_env.envs.tasks import (
     read_spin,
     things,
 )
-from spikecam_env.envs.tasks.base import View
+from spikecam_env.envs.tasks.base import CameraUnits
 
 RATE_HZ = 40_000.0
 SIDE = 64
 
 
-def view(of: Task) -> View:
-    return View((SIDE, SIDE), RATE_HZ, of.frames_per_step, things.TRAIN_PICTURES)
+def view(of: Task) -> CameraUnits:
+    return CameraUnits((SIDE, SIDE), RATE_HZ, of.frames_per_step, things.TRAIN_PICTURES)
 
 
 def drawn(of: Task, count: int = 40) -> list[Episode]:
@@ -61,12 +61,12 @@ def inner(scene: Any) -> Any:
     return scene
 
 
-def paths(of: Task) -> list[Path]:
+def paths(of: Task) -> list[PiecewisePath]:
     """Of the targets."""
     return [inner(episode.scene).discs[episode.target].path for episode in drawn(of)]
 
 
-def from_middle(path: Path) -> Any:
+def from_middle(path: PiecewisePath) -> Any:
     """[shorter sides]"""
     return (path.place - (SIDE - 1) / 2) / SIDE
 
@@ -111,10 +111,10 @@ def walls(of: Task) -> float:
     return float(max(np.abs(from_middle(path)).max() for path in paths(of)))
 
 
-def best(of: Task) -> list[Course]:
+def best(of: Task) -> list[StepOutcome]:
     """The ends of the oracle's episodes."""
     drive = Drive(Motor(of.top_sides_s * SIDE, of.rise_s), of.axes, of.frames_per_step, RATE_HZ)
-    return [list(steps_of(Course.begin(drive, episode), oracle))[-1] for episode in drawn(of, 10)]
+    return [list(steps_of(StepOutcome.begin(drive, episode), oracle))[-1] for episode in drawn(of, 10)]
 
 
 def share_of_time(of: Task) -> float:
@@ -198,7 +198,7 @@ def seen_to_move(_: Any) -> float:
 
 def rows_of_line(_: Any) -> float:
     """The line is seen, and hides nothing: rows at 256 x 256."""
-    of = View((256, 256), RATE_HZ, Catch.frames_per_step, things.TRAIN_PICTURES)
+    of = CameraUnits((256, 256), RATE_HZ, Catch.frames_per_step, things.TRAIN_PICTURES)
     tile = Catch().draw(np.random.default_rng(0), of).scene.tile  # type: ignore[attr-defined]
     return float((tile[:256, 0] == np.float32(things.BRIGHT)).sum())
 
@@ -267,9 +267,9 @@ def turn_a_step(_: Any) -> float:
 
 def guesses(_: Any) -> float:
     """Who says one speed after another gives three answers, one fewer than there are speeds."""
-    begun = Course.begin(Drive(Motor(640.0, 0.01), 2, 40, RATE_HZ), drawn(ReadSpin(), 1)[0])
+    begun = StepOutcome.begin(Drive(Motor(640.0, 0.01), 2, 40, RATE_HZ), drawn(ReadSpin(), 1)[0])
 
-    def guess(course: Course) -> Any:
+    def guess(course: StepOutcome) -> Any:
         wrong = [float(n == (course.episode.truth + 1) % 4) for n in range(4)]  # type: ignore[attr-defined]
         return np.array([*oracle(course)[:2], 1.0, *wrong])
 

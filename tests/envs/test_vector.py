@@ -19,7 +19,7 @@ from scenes.renderers import contexts, shared
 from scenes.renderers.choose import make as make_renderer
 from scenes.renderers.elsewhere import Elsewhere
 from scenes.renderers.embree import Embree
-from scenes.renderers.protocol import Lighting, Pinhole, Window
+from scenes.renderers.protocol import Lighting, PictureWindow, Pinhole
 from spikecam_env.bench.renderers import objects
 from spikecam_env.errors import InputError, NotReadyError
 from tests.envs.vectors import MANY
@@ -130,15 +130,15 @@ def test_a_renderer_in_another_process_draws_the_same_bits(kind: str) -> None:
     pose[2, 3] = 3.2
     camera = Pinhole(70.0, (39.5, 29.5), pose)
     for surface, at in objects()[:3] * 2:
-        a, b = (r.render(surface, at, camera, Lighting(), Window(0, 0, 60, 80)) for r in (here, there))
+        a, b = (r.render(surface, at, camera, Lighting(), PictureWindow(0, 0, 60, 80)) for r in (here, there))
         for name in ("radiance", "coverage", "depth"):
             np.testing.assert_array_equal(getattr(a, name), getattr(b, name))
     with pytest.raises(InputError, match="the window has 0 rows"):
-        there.render(*objects()[0], camera, Lighting(), Window(0, 0, 0, 80))
+        there.render(*objects()[0], camera, Lighting(), PictureWindow(0, 0, 0, 80))
     there.close()
     there.close()
     with pytest.raises(NotReadyError, match="closed"):
-        there.render(*objects()[0], camera, Lighting(), Window(0, 0, 60, 80))
+        there.render(*objects()[0], camera, Lighting(), PictureWindow(0, 0, 60, 80))
     here.close()
 
 

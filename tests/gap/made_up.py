@@ -8,7 +8,7 @@ from functools import lru_cache
 import numpy as np
 
 from spikecam_env.gap.observe.conditions import Condition
-from spikecam_env.gap.observe.observation import Observation, observe
+from spikecam_env.gap.observe.observation import ObservedRecording, observe
 from spikecam_env.gap.result import Bound, Diagnosis, Estimate, Evidence, Gap, NamedEffect, Ranked, Remainder, Statistic
 from spikecam_env.gap.twins.fresh_units import drawn_response
 from spikecam_env.gap.unit.refit import free_refit
@@ -55,7 +55,7 @@ def _bars(name: str, speed: float, use: str) -> Condition:
 
 
 @lru_cache
-def recorded(effect: str | None, take: int) -> tuple[Observation, ...]:
+def recorded(effect: str | None, take: int) -> tuple[ObservedRecording, ...]:
     """One unit of scsim, with an effect or without, before all conditions; another take is other temporal noise."""
     model = MODEL.with_effect(CATALOGUE[effect](**EFFECTS[effect])) if effect else MODEL
     out = []
@@ -80,7 +80,7 @@ def evidence(effect: str | None, *, named: bool = True, only: tuple[str, ...] = 
     kept = [i for i, c in enumerate(conditions()) if not only or c.name in only]
     shown = tuple(conditions()[i] for i in kept)
 
-    def take(effect: str | None, number: int) -> tuple[Observation, ...]:
+    def take(effect: str | None, number: int) -> tuple[ObservedRecording, ...]:
         return tuple(recorded(effect, number)[i] for i in kept)
 
     streams = [take(effect, 0), take(None, 1), take(effect, 2) if named and effect else None]

@@ -14,7 +14,7 @@ from spikecam_env.gap.compare.prediction import Draw, Null, Prediction
 from spikecam_env.gap.fit.candidate import Fit
 from spikecam_env.gap.fit.problem import Problem
 from spikecam_env.gap.settings import DiagnosisSettings
-from spikecam_env.gap.statistics import Key
+from spikecam_env.gap.statistics import StatisticKey
 from spikecam_env.sensor import CATALOGUE
 
 COUNT, TWINS = 20, 6
@@ -26,7 +26,7 @@ def null(settings: DiagnosisSettings | None = None) -> Null:
     """COUNT statistics of rates, each of noise 1."""
     values = np.random.default_rng(0).standard_normal((TWINS, COUNT))
     draws = tuple(Draw(n, v, None) for n, v in enumerate(values))
-    keys = tuple(Key("rates", "r", str(i)) for i in range(COUNT))
+    keys = tuple(StatisticKey("rates", "r", str(i)) for i in range(COUNT))
     mean, one = values.mean(axis=0), np.ones(COUNT)
     there = settings or DiagnosisSettings()
     return Null(keys, mean, one, np.zeros(COUNT), TWINS, TWINS - 1, draws=draws, settings=there)

@@ -17,9 +17,9 @@ from spikecam_env.gap.compare.distance import deviates
 from spikecam_env.gap.compare.prediction import Null, values_of
 from spikecam_env.gap.fit.candidate import Fit
 from spikecam_env.gap.observe.conditions import Condition, planned_conditions
-from spikecam_env.gap.observe.observation import Observation, observe
+from spikecam_env.gap.observe.observation import ObservedRecording, observe
 from spikecam_env.gap.search.round import Round
-from spikecam_env.gap.statistics import Key
+from spikecam_env.gap.statistics import StatisticKey
 from spikecam_env.gap.twins.case import Case, case_of
 from spikecam_env.gap.twins.simulate import expose
 from spikecam_env.gap.unit.conversion import exact_refit, unit_from_refit
@@ -91,7 +91,7 @@ def case_from(spikes: dict[str, Spikes], seed: int = 1, shown: Sequence[Conditio
 
 
 @lru_cache(maxsize=32)
-def _observed(packed: bytes, frames: int, film: bool) -> Observation:
+def _observed(packed: bytes, frames: int, film: bool) -> ObservedRecording:
     """Of a recording of these bits; of most a test changes one and the others were observed before."""
     return observe(np.frombuffer(packed, np.uint8).reshape(frames, -1), SHAPE, film=film)
 
@@ -102,19 +102,19 @@ def null() -> Null:
     return model_null(recorded(seed=2), MODEL, TWINS)
 
 
-def seen(case: Case) -> dict[Key, float]:
+def seen(case: Case) -> dict[StatisticKey, float]:
     """Every statistic of a case as a normal deviate from the model without effects."""
     n = null()
     return dict(zip(n.keys, deviates(n, values_of(case.bank, n.keys)), strict=True))
 
 
-def loudest(z: dict[Key, float], group: str) -> tuple[float, Key | None]:
+def loudest(z: dict[StatisticKey, float], group: str) -> tuple[float, StatisticKey | None]:
     """The largest |z| of a group."""
     of = [(abs(v), k) for k, v in z.items() if k.group == group]
     return max(of, default=(0.0, None))
 
 
-def summary(z: dict[Key, float]) -> str:
+def summary(z: dict[StatisticKey, float]) -> str:
     """One line: the loudest of every group."""
     groups = dict.fromkeys(k.group for k in z)
     return ", ".join(
@@ -134,7 +134,7 @@ def check_reveals(group: str, shown_by: Effect, where: str, names: Sequence[str]
     """
     with_it, without = seen(recorded(shown_by)), seen(recorded(seed=5))
     for name in names:
-        key = Key(group, where, name)
+        key = StatisticKey(group, where, name)
         print(f"{shown_by.name}: {where} {name} {with_it[key]:.1f}, without {without[key]:.1f}")
         assert abs(with_it[key]) > CLEAR
         assert abs(without[key]) < quiet(1)

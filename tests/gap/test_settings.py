@@ -45,7 +45,7 @@ from spikecam_env.gap.screen.screen import Screened
 from spikecam_env.gap.search import cancelling_pair, forward, joint_start, neighbours, rivals, shortlist
 from spikecam_env.gap.search.round import Round, absent, is_improvement, is_small_share, is_visible
 from spikecam_env.gap.settings import Deviance, DiagnosisSettings, every_setting
-from spikecam_env.gap.statistics import Key
+from spikecam_env.gap.statistics import StatisticKey
 from spikecam_env.gap.twins.budget import Budget
 from spikecam_env.gap.twins.fresh_units import drawn_banks
 from spikecam_env.gap.unit.indirect_inference import has_converged
@@ -188,8 +188,16 @@ def _(settings, patch):
 
 def one_statistic(settings):
     """One statistic of rates whose noise is known."""
-    return replace(null(settings), keys=(Key("rates", "r", "0"),), mean=np.zeros(1), sd=np.ones(1), floor=np.zeros(1),
-                   twins=1_000_000, freedom=1e9, draws=())  # fmt: skip
+    return replace(
+        null(settings),
+        keys=(StatisticKey("rates", "r", "0"),),
+        mean=np.zeros(1),
+        sd=np.ones(1),
+        floor=np.zeros(1),
+        twins=1_000_000,
+        freedom=1e9,
+        draws=(),
+    )
 
 
 @probe_of("judging.heavy")
@@ -234,7 +242,7 @@ def _(settings, patch):
 
 @probe_of("judging.apart")
 def _(settings, patch):
-    n = replace(null(settings), keys=(Key("rates", "r", "0"), Key("moving", "r", "0")))
+    n = replace(null(settings), keys=(StatisticKey("rates", "r", "0"), StatisticKey("moving", "r", "0")))
     return [shortlist.groups_that_stand_out(n, np.array([20.0, noises])) for noises in beside(6.0)]
 
 
@@ -698,7 +706,7 @@ def _(settings, patch):
 
 def places(settings):
     """A hundred statistics of one place, and one of another."""
-    keys = (*(Key("rates", "a", str(n)) for n in range(100)), Key("drift", "b", "0"))
+    keys = (*(StatisticKey("rates", "a", str(n)) for n in range(100)), StatisticKey("drift", "b", "0"))
     return replace(null(settings), keys=keys, mean=np.zeros(101), sd=np.ones(101), floor=np.zeros(101),
                    twins=1_000_000, freedom=1e9, draws=())  # fmt: skip
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import torch
 
-from scenes.discs import Disc, Discs, Path
+from scenes.discs import Disc, Discs, PiecewisePath
 from scenes.disk import RotatingDisk
 from scenes.painted_disk import Texels, prefiltered
 from scenes.planes import painted_planes
@@ -26,15 +26,15 @@ def discs() -> Discs:
     """Two that overlap, one at the picture's corner."""
     rng = np.random.default_rng(0)
     texels = [Texels.of(prefiltered(rng.random((64, 64)), radius)) for radius in (9.0, 14.5)]
-    path = Path.straight((-20.0, -2.0), (0.4, 0.3), 100.0)
+    path = PiecewisePath.straight((-20.0, -2.0), (0.4, 0.3), 100.0)
     return Discs(
         SHAPE,
         40_000.0,
         rng.random((31, 37)).astype(np.float32),
         {
             "small": Disc(texels[0], 9.0, path, rpm=900.0),
-            "large": Disc(texels[1], 14.5, Path.still(20.0, 20.0), rpm=-300.0, angle=1.0),
-            "corner": Disc(texels[0], 9.0, Path.still(62.0, 50.0)),
+            "large": Disc(texels[1], 14.5, PiecewisePath.still(20.0, 20.0), rpm=-300.0, angle=1.0),
+            "corner": Disc(texels[0], 9.0, PiecewisePath.still(62.0, 50.0)),
         },
     )
 

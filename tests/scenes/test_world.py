@@ -16,7 +16,7 @@ from scenes.layers import carry, project, render_key
 from scenes.meshes import assemble, box, disc, rectangle, sphere, torus
 from scenes.protocol import Gaze, Scene
 from scenes.renderers.embree import Embree
-from scenes.renderers.protocol import Lighting, Pinhole, Window
+from scenes.renderers.protocol import Lighting, PictureWindow, Pinhole
 from scenes.textures import blobs, dead_leaves
 from scenes.trajectories import AT_REST, Ballistic, Path, Shake, Spinning, Still, Trajectory, Vibrating
 from scenes.world import Body, World
@@ -208,7 +208,7 @@ def test_depth_carries_what_a_key_shows_to_its_place(renderer: Embree) -> None:
     camera = Camera((0, 0, 3))
     focal, centre = camera.focal(SHAPE[0]), ((SHAPE[1] - 1) / 2, (SHAPE[0] - 1) / 2)
     then, now = (np.linalg.inv(camera.pose(np.array(t))) @ motion.pose(np.array(t)) for t in (0.0, 32 / 40_000))
-    lens, window = Pinhole(focal, centre, camera.pose(np.array(0.0))), Window(0, 0, *SHAPE)
+    lens, window = Pinhole(focal, centre, camera.pose(np.array(0.0))), PictureWindow(0, 0, *SHAPE)
     key = render_key(renderer, surface, motion.pose(np.array(0.0)), lens, Lighting(), window, 1.0)
     rigid = carry(key, now[None], then, focal, np.array([centre])).rigid[0].astype(np.float64)
     pixels, depth = project(now, key.points, focal, centre)

@@ -14,7 +14,7 @@ from scenes.renderers.embree import Embree
 from scenes.renderers.protocol import Sprite, Surface
 from scenes.trajectories import Ballistic, Spinning
 from scenes.world import Body, World
-from scenes.world.cache import PLANS, Recent, WorldCache
+from scenes.world.cache import PLANS, RecentResults, WorldCache
 from scenes.world.plan import BLOCK, SHORTEST_KEY_STEP, pace_of
 
 BODIES = 6
@@ -48,7 +48,7 @@ def fast_balls(renderer: Counting) -> World:
 
 
 def test_recent_keeps_the_entries_asked_for_last() -> None:
-    recent: Recent[int] = Recent(2)
+    recent: RecentResults[int] = RecentResults(2)
     made: list[str] = []
 
     def make(name: str) -> int:

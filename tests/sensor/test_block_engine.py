@@ -17,11 +17,12 @@ from laws import jittered, with_effects
 from benchmarks.agreement import compare, observe
 from spikecam_env.errors import InputError
 from spikecam_env.sensor import CATALOGUE, Effect, SensorModel, SpikeSensor, Stage, Unit, crossing, decay, random_fields
-from spikecam_env.sensor.effects.base import Array, Charge, Exposure, Spikes, parameter
+from spikecam_env.sensor.effects.base import Charge, ExposureBlock, parameter
 from spikecam_env.sensor.kernels import block, block_loop, draws, loop
 from spikecam_env.sensor.light import Segment
 from spikecam_env.sensor.model import generator
 from spikecam_env.sensor.random_fields import octave_field, white_field, words
+from spikecam_env.types import Floats, Masks
 
 pytestmark = pytest.mark.slow
 
@@ -65,7 +66,7 @@ def test_with_noise_it_agrees_with_the_reference_in_distribution(name: str, inte
     assert p[worst] > limit
 
 
-def started(model: SensorModel, engine: str, phase: Array) -> SpikeSensor:
+def started(model: SensorModel, engine: str, phase: Floats) -> SpikeSensor:
     """A camera at given phases; its noise is its engine's own."""
     sensor = SpikeSensor(model, phase.shape, 1, engine)
     sensor._start(1, phase)
@@ -89,7 +90,7 @@ def test_threads_and_block_lengths_change_no_bit(name: str, monkeypatch: pytest.
     monkeypatch.setattr(block, "_FEWEST", 1)
     model = with_effects("scsim", CATALOGUE[name]())
     unit = model.draw_unit((33, 50), 0)
-    first = Exposure(0, model.frame_rate_hz, (33, 50), unit)
+    first = ExposureBlock(0, model.frame_rate_hz, (33, 50), unit)
     effects = [e for e in model.effects if not e.is_fixed()]
     light = np.random.default_rng(0).uniform(0, 1.2, (2, unit.gain.size)).astype(np.float32)
     streams = []
@@ -153,11 +154,11 @@ class Blinking(Effect):
     stage = Stage.OPTICS
     strength = "depth"
 
-    def collect(self, light: Charge, dark: Charge, now: Exposure, memory: Any) -> tuple[Charge, Charge, Any]:
+    def collect(self, light: Charge, dark: Charge, now: ExposureBlock, memory: Any) -> tuple[Charge, Charge, Any]:
         odd = (now.number + np.arange(now.frames)) % 2
         return light.scaled(1.0 - self.depth * odd[:, None, None]), dark, memory
 
-    def read_out(self, spikes: Spikes, now: Exposure, memory: Any) -> tuple[Spikes, Any]:
+    def read_out(self, spikes: Masks, now: ExposureBlock, memory: Any) -> tuple[Masks, Any]:
         return spikes & (np.arange(now.shape[1]) != 3), memory
 
 
@@ -170,7 +171,7 @@ class Sticky(Effect):
     stage = Stage.RESET
     strength = "share"
 
-    def after_reset(self, residual: Array, rate: Array, now: Exposure) -> Array:
+    def after_reset(self, residual: Floats, rate: Floats, now: ExposureBlock) -> Floats:
         return residual * (1.0 - self.share)
 
 

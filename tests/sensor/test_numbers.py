@@ -11,11 +11,11 @@ from scipy.stats import norm
 
 from spikecam_env.errors import InputError
 from spikecam_env.sensor import CATALOGUE, SensorModel, SpikeSensor, drive, reference
-from spikecam_env.sensor.effects.base import Effect, Exposure, Shift, Stage, parameter
+from spikecam_env.sensor.effects.base import Effect, ExposureBlock, Shift, Stage, parameter
 
 IDEAL = SensorModel.preset("ideal")
 RATE_HZ = 40_000.0
-FIRST = Exposure(0, RATE_HZ, (1, 1), IDEAL.draw_unit((1, 1), 0))
+FIRST = ExposureBlock(0, RATE_HZ, (1, 1), IDEAL.draw_unit((1, 1), 0))
 
 
 def with_circuit(**parameters: float) -> SensorModel:
@@ -62,7 +62,7 @@ class Lowered(Effect):
     strength = "factor"
     neutral = 1.0
 
-    def compare(self, now: Exposure, memory: Any) -> tuple[Shift, Any]:
+    def compare(self, now: ExposureBlock, memory: Any) -> tuple[Shift, Any]:
         return Shift(factor=self.factor), memory
 
 

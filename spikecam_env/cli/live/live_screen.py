@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from PIL import Image, ImageDraw
 
 from spikecam_env.cli.live.screen import BRIGHT_PERCENT
-from spikecam_env.cli.panels import BACKGROUND, INK, MARGIN, Panel, compose, display, font, panel_scale
+from spikecam_env.cli.panels import BACKGROUND, INK, MARGIN, PicturePanel, compose, display, font, panel_scale
 
 LEVELS = 1 << 16
 """Brightnesses in the table, those of a uint16: with fewer the darkest would be more than two grey values apart."""
@@ -28,7 +28,7 @@ class LiveScreen:
 
     def __init__(self, shape: tuple[int, int], title: str, mode: str) -> None:
         black = np.zeros(shape, np.float32)
-        panels = [Panel(black, "noisy spikes (TFP)", title), Panel(black, "denoised (DnSS)", mode)]
+        panels = [PicturePanel(black, "noisy spikes (TFP)", title), PicturePanel(black, "denoised (DnSS)", mode)]
         self._empty = compose(panels, 1.0)
         self._scale = panel_scale(shape[1])
         self._grey = display(np.arange(LEVELS) / (LEVELS - 1), 1.0)

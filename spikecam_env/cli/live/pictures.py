@@ -3,10 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
-Spikes = NDArray[np.uint8]
-Picture = NDArray[np.float32]
+from spikecam_env.types import Pictures, Spikes
 
 WINDOW = 40
 """Frames of a noisy picture at least: a millisecond at 40 kHz."""
@@ -18,7 +16,7 @@ class Noisy:
     def __init__(self) -> None:
         self._recent: list[Spikes] = []
 
-    def push(self, spikes: Spikes) -> Picture:
+    def push(self, spikes: Spikes) -> Pictures:
         """(K, H, W) more spikes -> (H, W) spikes a frame."""
         blocks = -(-WINDOW // len(spikes))
         self._recent = [*self._recent, spikes][-blocks:]
@@ -35,9 +33,9 @@ class Denoised:
         from denoiser import OnlineDnSS
 
         self._online = OnlineDnSS.pretrained("best", output="rate")
-        self._newest: Picture | None = None
+        self._newest: Pictures | None = None
 
-    def push(self, spikes: Spikes) -> Picture | None:
+    def push(self, spikes: Spikes) -> Pictures | None:
         """(K, H, W) more spikes -> (H, W) spikes a frame, 17 to 32 frames old; None before the first is finished."""
         planes = self._online.push(spikes)
         if len(planes):

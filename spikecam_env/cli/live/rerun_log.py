@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from spikecam_env.cli.live.timeline import Entry
+from spikecam_env.cli.live.timeline import TimelineEntry
 from spikecam_env.errors import InputError
 
 
@@ -24,7 +24,7 @@ def rerun() -> ModuleType:
         raise InputError("rerun is not installed; pip install 'spikecam-env[view]'") from error
 
 
-def recorded(title: str, frame_rate_hz: float, entries: Iterable[Entry]) -> bytes:
+def recorded(title: str, frame_rate_hz: float, entries: Iterable[TimelineEntry]) -> bytes:
     """A whole .rrd file: rerun ends every part that it gives away with an index.  Raises InputError without rerun."""
     recording = _recording(title)
     stream = recording.binary_stream()
@@ -33,7 +33,7 @@ def recorded(title: str, frame_rate_hz: float, entries: Iterable[Entry]) -> byte
     return content
 
 
-def watched(title: str, frame_rate_hz: float, entries: Iterable[Entry]) -> None:
+def watched(title: str, frame_rate_hz: float, entries: Iterable[TimelineEntry]) -> None:
     """Open the viewer, and fill it.  Raises InputError without rerun, and where its viewer cannot be started."""
     recording = _recording(title)
     try:
@@ -53,7 +53,7 @@ def _recording(title: str) -> Any:
     return recording
 
 
-def _send(recording: Any, frame_rate_hz: float, entries: Iterable[Entry]) -> None:
+def _send(recording: Any, frame_rate_hz: float, entries: Iterable[TimelineEntry]) -> None:
     """Log each entry, on the timelines `time` [s] and `frame`; what is new gets its name, and its place on the page."""
     package, known = rerun(), set[str]()
     pictures: list[str] = []
@@ -73,7 +73,7 @@ def _send(recording: Any, frame_rate_hz: float, entries: Iterable[Entry]) -> Non
         recording.log(_path(entry), _shown(package, entry))
 
 
-def _shown(package: ModuleType, entry: Entry) -> Any:
+def _shown(package: ModuleType, entry: TimelineEntry) -> Any:
     if isinstance(entry.value, np.ndarray):
         return package.Image(entry.value)
     if isinstance(entry.value, tuple):
@@ -81,7 +81,7 @@ def _shown(package: ModuleType, entry: Entry) -> Any:
     return package.Scalars(entry.value)
 
 
-def _path(entry: Entry) -> list[str]:
+def _path(entry: TimelineEntry) -> list[str]:
     """As rerun has it, with every character allowed."""
     return entry.path.split("/")
 

@@ -9,8 +9,9 @@ from numpy.typing import NDArray
 from PIL import Image, ImageDraw
 
 from spikecam_env.cli.live.episodes import Moment
-from spikecam_env.cli.live.pictures import Denoised, Noisy, Picture
-from spikecam_env.cli.panels import BACKGROUND, FAINT, INK, MARGIN, Panel, compose, font, panel_scale
+from spikecam_env.cli.live.pictures import Denoised, Noisy
+from spikecam_env.cli.panels import BACKGROUND, FAINT, INK, MARGIN, PicturePanel, compose, font, panel_scale
+from spikecam_env.types import Pictures
 
 AIM, TARGET = (255, 176, 0), (90, 200, 250)
 """Colours of the middle's mark, and of the target's where that is to be seen."""
@@ -45,11 +46,11 @@ class Screen:
         noisy = self._noisy.push(moment.spikes)
         if moment.step == 0:
             self._white = float(np.percentile(noisy, BRIGHT_PERCENT)) or 1.0
-        self._panels = [Panel(noisy, "noisy spikes (TFP)", self._who)]
+        self._panels = [PicturePanel(noisy, "noisy spikes (TFP)", self._who)]
         if self._denoised is not None:
             clean = self._denoised.push(moment.spikes)
             line = "" if clean is not None else "noisy until the first frames are finished"
-            self._panels.append(Panel(noisy if clean is None else clean, "denoised (DnSS)", line))
+            self._panels.append(PicturePanel(noisy if clean is None else clean, "denoised (DnSS)", line))
 
     def picture(self, moment: Moment) -> NDArray[np.uint8]:
         """(rows, columns, 3) uint8, even sizes, of the moment that was seen last."""
@@ -85,7 +86,7 @@ def outcome(moment: Moment) -> str:
     return "success" if moment.info["is_success"] else "over"
 
 
-def _mark(draw: ImageDraw.ImageDraw, picture: Picture, panels: int, moment: Moment, target: bool) -> None:
+def _mark(draw: ImageDraw.ImageDraw, picture: Pictures, panels: int, moment: Moment, target: bool) -> None:
     """A cross in the middle of every panel, a ring about the target."""
     rows, columns = picture.shape
     scale = panel_scale(columns)

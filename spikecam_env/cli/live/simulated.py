@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 
 @dataclass
-class Simulated:
+class SimulatedSource:
     """A `streams.sources.Source`: frames are simulated as they are read, at `speed` times the camera's frame rate at
     most.  One that is slower is late, and loses nothing."""
 

@@ -32,7 +32,7 @@ Pixel = tuple[int, int]
 
 
 @dataclass(frozen=True)
-class Entry:
+class TimelineEntry:
     """path: room/name.  frame: of the camera.  value: a picture (H, W) uint8, a number, or a place (x, y) [pixels]."""
 
     path: str
@@ -40,7 +40,7 @@ class Entry:
     value: NDArray[np.uint8] | float | tuple[float, float]
 
 
-def entries(stream: Stream, pixels: Sequence[Pixel], denoise: bool = True) -> Iterator[Entry]:
+def entries(stream: Stream, pixels: Sequence[Pixel], denoise: bool = True) -> Iterator[TimelineEntry]:
     """Of a stream, block by block; denoised ones follow as they are finished."""
     planes = _Planes() if denoise else None
     white = 0.0
@@ -68,22 +68,22 @@ def pixel(text: str, shape: tuple[int, int]) -> Pixel:
 
 def _of_picture(
     path: str, what: str, frame: int, rate: NDArray[np.float32], pixels: Sequence[Pixel], white: float
-) -> Iterator[Entry]:
-    yield Entry(path, frame, display(rate, white))
+) -> Iterator[TimelineEntry]:
+    yield TimelineEntry(path, frame, display(rate, white))
     for row, column in pixels:
-        yield Entry(f"{RATES}/{row},{column} {what}", frame, float(rate[row, column]))
+        yield TimelineEntry(f"{RATES}/{row},{column} {what}", frame, float(rate[row, column]))
 
 
-def _of_block(block: Block) -> Iterator[Entry]:
+def _of_block(block: Block) -> Iterator[TimelineEntry]:
     last = block.first + len(block.spikes)
     mean = float(block.spikes.mean())
-    yield Entry("spikes a frame/mean of all pixels", last, mean)
+    yield TimelineEntry("spikes a frame/mean of all pixels", last, mean)
     if mean:
-        yield Entry("mean interval [frames]/mean interval", last, 1 / mean)
+        yield TimelineEntry("mean interval [frames]/mean interval", last, 1 / mean)
     for name, value in block.figures.items():
-        yield Entry(name, last, value)
+        yield TimelineEntry(name, last, value)
     if block.target is not None:
-        yield Entry(TARGET, last, block.target)
+        yield TimelineEntry(TARGET, last, block.target)
 
 
 class _Planes:

@@ -63,11 +63,11 @@ class Watching:
 
     def in_a_window(self) -> None:
         """Until it is closed, or Esc is pressed."""
-        from spikecam_env.cli.live.window import Window
+        from spikecam_env.cli.live.window import DisplayWindow
 
         while not self._session.over and self._shown is None:
             self._next(IDLE_S)
-        window = Window(f"spikecam live {self._source.title}", self._picture(), set())
+        window = DisplayWindow(f"spikecam live {self._source.title}", self._picture(), set())
         while not (self._session.over or window.closed or "escape" in window.taken()):
             if self._next(0.0):
                 window.show(self._picture(), 0.0)

@@ -16,7 +16,7 @@ SHORTEST_WAIT_S = 0.001
 """A window is given at least this long to see its keys, however late the picture is."""
 
 
-class Window:
+class DisplayWindow:
     """held: keys that steer and are down.  pressed: other keys, oldest first, until taken.  closed: by its user."""
 
     def __init__(self, title: str, picture: NDArray[np.uint8], held: set[str]) -> None:

@@ -10,9 +10,10 @@ from spikecam_env.envs.observations.blocks import Multibinary, Packed, Spikes, b
 from spikecam_env.envs.observations.frame_camera import FrameCamera
 from spikecam_env.envs.observations.intervals import ISI, TFI
 from spikecam_env.envs.observations.playback import TFP
-from spikecam_env.envs.observations.protocol import Blocks, Observation, View, replaced, restarted, with_rows
+from spikecam_env.envs.observations.protocol import Blocks, CameraView, Observation, replaced, restarted, with_rows
 from spikecam_env.envs.observations.state import with_state, with_state_space
 from spikecam_env.errors import InputError, shown, unknown_name
+from spikecam_env.renamed import old_names
 
 __all__ = [
     "ISI",
@@ -20,12 +21,12 @@ __all__ = [
     "TFI",
     "TFP",
     "Blocks",
+    "CameraView",
     "FrameCamera",
     "Multibinary",
     "Observation",
     "Packed",
     "Spikes",
-    "View",
     "block_shape",
     "observation",
     "replaced",
@@ -65,3 +66,6 @@ def observation(obs: str | Observation) -> Observation:
     if obs not in OBSERVATIONS:
         raise unknown_name("obs", obs, OBSERVATIONS)
     return OBSERVATIONS[obs]()
+
+
+__getattr__ = old_names(__name__, {"View": "CameraView"})

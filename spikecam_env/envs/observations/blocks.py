@@ -9,7 +9,7 @@ import numpy as np
 from gymnasium import spaces
 from numpy.typing import NDArray
 
-from spikecam_env.envs.observations.protocol import Blocks, Observation, View
+from spikecam_env.envs.observations.protocol import Blocks, CameraView, Observation
 from spikecam_env.errors import InputError
 from spikecam_env.streams.packing import packed_bytes
 
@@ -37,7 +37,7 @@ class Spikes(Observation):
 
     takes_tensors = True
 
-    def space(self, view: View) -> spaces.Space[Any]:
+    def space(self, view: CameraView) -> spaces.Space[Any]:
         return spaces.Box(0, 1, (view.frames_per_step, *view.shape), np.int8)
 
     def step(self, blocks: Blocks, state: Any) -> tuple[NDArray[np.int8], Any]:
@@ -50,7 +50,7 @@ class Spikes(Observation):
 class Multibinary(Spikes):
     """The same as a `MultiBinary` space, which stable-baselines3 and TorchRL refuse."""
 
-    def space(self, view: View) -> spaces.Space[Any]:
+    def space(self, view: CameraView) -> spaces.Space[Any]:
         return spaces.MultiBinary((view.frames_per_step, *view.shape))
 
 
@@ -58,7 +58,7 @@ class Multibinary(Spikes):
 class Packed(Observation):
     """(K, ceil(H W / 8)) uint8, bits as `streams.unpack_frames` reads them."""
 
-    def space(self, view: View) -> spaces.Space[Any]:
+    def space(self, view: CameraView) -> spaces.Space[Any]:
         return spaces.Box(0, 255, (view.frames_per_step, packed_bytes(view.shape)), np.uint8)
 
     def step(self, blocks: Blocks, state: Any) -> tuple[NDArray[np.uint8], Any]:

@@ -19,7 +19,7 @@ from gymnasium import spaces
 from numpy.typing import ArrayLike, NDArray
 
 from spikecam_env.checked import checked_number
-from spikecam_env.envs.observations.protocol import Blocks, Observation, View, grey, picture_space
+from spikecam_env.envs.observations.protocol import Blocks, CameraView, Observation, grey, picture_space
 from spikecam_env.errors import InputError
 from spikecam_env.sensor import Keyframes
 from spikecam_env.sensor.between_keys import key_weights
@@ -56,10 +56,10 @@ class FrameCamera(Observation):
         if self.exposure_s is not None:
             checked_number(self.exposure_s, "exposure_s", 0.0, 1.0 / self.rate_hz, above=True, unit="s")
 
-    def space(self, view: View) -> spaces.Box:
+    def space(self, view: CameraView) -> spaces.Box:
         return picture_space(view)
 
-    def start(self, view: View, streams: int) -> Shutter:
+    def start(self, view: CameraView, streams: int) -> Shutter:
         return Shutter(
             np.zeros((streams, *view.shape)),
             np.zeros((streams, 1, *view.shape), np.uint8),

@@ -17,7 +17,7 @@ from gymnasium import spaces
 from numpy.typing import NDArray
 
 from spikecam_env.compiled import njit
-from spikecam_env.envs.observations.protocol import Blocks, Observation, View, grey, picture_space
+from spikecam_env.envs.observations.protocol import Blocks, CameraView, Observation, grey, picture_space
 
 LONGEST = 1 << 24
 """Frames up to which float32 counts one by one (7 minutes at 40 kHz); a longer interval is given as this."""
@@ -30,7 +30,7 @@ class Waiting(NamedTuple):
     interval: NDArray[np.int32]
 
 
-def waiting(view: View, streams: int) -> Waiting:
+def waiting(view: CameraView, streams: int) -> Waiting:
     """Before the first frame."""
     shape = (streams, *view.shape)
     return Waiting(np.zeros(shape, np.int32), np.zeros(shape, np.int32))
@@ -57,10 +57,10 @@ def known_interval(state: Waiting) -> NDArray[np.int32]:
 class ISI(Observation):
     """(1, H, W) float32, the interval [frames], 1 or more."""
 
-    def space(self, view: View) -> spaces.Box:
+    def space(self, view: CameraView) -> spaces.Box:
         return spaces.Box(1.0, float(LONGEST), (1, *view.shape), np.float32)
 
-    def start(self, view: View, streams: int) -> Waiting:
+    def start(self, view: CameraView, streams: int) -> Waiting:
         return waiting(view, streams)
 
     def step(self, blocks: Blocks, state: Waiting) -> tuple[NDArray[np.float32], Waiting]:
@@ -72,10 +72,10 @@ class ISI(Observation):
 class TFI(Observation):
     """(1, H, W) uint8: 255 where a pixel fires in every frame."""
 
-    def space(self, view: View) -> spaces.Box:
+    def space(self, view: CameraView) -> spaces.Box:
         return picture_space(view)
 
-    def start(self, view: View, streams: int) -> Waiting:
+    def start(self, view: CameraView, streams: int) -> Waiting:
         return waiting(view, streams)
 
     def step(self, blocks: Blocks, state: Waiting) -> tuple[NDArray[np.uint8], Waiting]:

@@ -16,11 +16,11 @@ from numpy.typing import NDArray
 
 from spikecam_env.checked import checked_count
 from spikecam_env.compiled import njit
-from spikecam_env.envs.observations.protocol import Blocks, Observation, View, grey, picture_space
+from spikecam_env.envs.observations.protocol import Blocks, CameraView, Observation, grey, picture_space
 from spikecam_env.errors import InputError
 
 
-class Recent(NamedTuple):
+class RecentFrames(NamedTuple):
     """frames: (N, window - K, H, W) the last frames, those of before the episode 0.  seen: (N,) frames, to `window`."""
 
     frames: NDArray[np.uint8]
@@ -43,16 +43,16 @@ class TFP(Observation):
         if self.window is not None:
             checked_count(self.window, "window")
 
-    def space(self, view: View) -> spaces.Box:
+    def space(self, view: CameraView) -> spaces.Box:
         return picture_space(view)
 
-    def start(self, view: View, streams: int) -> Recent:
+    def start(self, view: CameraView, streams: int) -> RecentFrames:
         kept = max(0, (self.window or 0) - view.frames_per_step)
         if kept and view.device is not None:
             raise InputError(f"window is {self.window}; on a device it is {view.frames_per_step} at most, the step's")
-        return Recent(np.zeros((streams, kept, *view.shape), np.uint8), np.zeros(streams, np.int64))
+        return RecentFrames(np.zeros((streams, kept, *view.shape), np.uint8), np.zeros(streams, np.int64))
 
-    def step(self, blocks: Blocks, state: Recent) -> tuple[NDArray[np.uint8], Recent]:
+    def step(self, blocks: Blocks, state: RecentFrames) -> tuple[NDArray[np.uint8], RecentFrames]:
         count, kept = blocks.spikes.shape[1], state.frames.shape[1]
         window = self.window or count
         if not isinstance(blocks.spikes, np.ndarray):
@@ -62,7 +62,7 @@ class TFP(Observation):
             frames = np.concatenate([state.frames, frames], axis=1)
         seen = np.minimum(state.seen + count, window)
         levels = grey(np.arange(window + 1) / seen[:, None].astype(np.float32))
-        return looked_up(frames[:, -window:], levels), Recent(frames[:, frames.shape[1] - kept :], seen)
+        return looked_up(frames[:, -window:], levels), RecentFrames(frames[:, frames.shape[1] - kept :], seen)
 
 
 def looked_up(spikes: NDArray[np.uint8], levels: NDArray[np.uint8]) -> NDArray[np.uint8]:

@@ -17,14 +17,15 @@ import numpy as np
 from gymnasium import spaces
 from numpy.typing import ArrayLike, NDArray
 
+from spikecam_env.renamed import old_names
 from spikecam_env.sensor import Keyframes
+from spikecam_env.types import Masks
 
-Streams = NDArray[np.bool_]
 """(N,) which of the streams."""
 
 
 @dataclass(frozen=True)
-class View:
+class CameraView:
     """The camera that agents look through: shape (rows, columns), K frames a step, frames a second.
 
     device: the torch device that its blocks are tensors on; None: they are arrays.
@@ -62,10 +63,10 @@ class Observation(ABC):
     """Whether a stream on a device may begin anew between two blocks of the others."""
 
     @abstractmethod
-    def space(self, view: View) -> spaces.Space[Any]:
+    def space(self, view: CameraView) -> spaces.Space[Any]:
         """Of one stream."""
 
-    def start(self, view: View, streams: int) -> Any:
+    def start(self, view: CameraView, streams: int) -> Any:
         """The state of streams before their first block: a tuple of arrays (N, ...), or something of the law's own."""
         return ()
 
@@ -81,14 +82,14 @@ class Observation(ABC):
         return 0.0
 
 
-def restarted(law: Observation, view: View, state: Any, which: Streams) -> Any:
+def restarted(law: Observation, view: CameraView, state: Any, which: Masks) -> Any:
     """The state with these streams before their first block again."""
     if hasattr(state, "restarted"):
         return state.restarted(which)
     return replaced(state, law.start(view, 1), which)
 
 
-def replaced(state: Any, others: Any, which: Streams) -> Any:
+def replaced(state: Any, others: Any, which: Masks) -> Any:
     """A state in which other streams take the place of some.
 
     Args:
@@ -105,7 +106,7 @@ def replaced(state: Any, others: Any, which: Streams) -> Any:
     return type(state)(*arrays) if arrays else state
 
 
-def with_rows(values: Any, rows: Any, which: Streams) -> Any:
+def with_rows(values: Any, rows: Any, which: Masks) -> Any:
     """Values of N streams with others in the place of some.
 
     Args:
@@ -134,6 +135,9 @@ def grey(rate: NDArray[Any]) -> NDArray[np.uint8]:
     return np.asarray((255.0 * np.minimum(rate, 1.0) + 0.5).astype(np.uint8))
 
 
-def picture_space(view: View) -> spaces.Box:
+def picture_space(view: CameraView) -> spaces.Box:
     """Of a picture as learners of pictures take it: (1, H, W) uint8, channels first."""
     return spaces.Box(0, 255, (1, *view.shape), np.uint8)
+
+
+__getattr__ = old_names(__name__, {"View": "CameraView"})

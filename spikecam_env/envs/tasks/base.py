@@ -8,10 +8,11 @@ from typing import Any, ClassVar
 import numpy as np
 
 from spikecam_env.envs.episode import Episode
+from spikecam_env.renamed import old_names
 
 
 @dataclass(frozen=True)
-class View:
+class CameraUnits:
     """What a task knows of the camera that plays it: units to turn sides and seconds into pixels and frames.
 
     pictures  numbers of the textures that this split may show (`tasks.things`)
@@ -89,10 +90,13 @@ class Task:
     """Stream of random numbers: tasks whose draws begin alike have different ones, so that no task is tested on the
     episodes that another is trained on."""
 
-    def draw(self, rng: np.random.Generator, view: View) -> Episode:
+    def draw(self, rng: np.random.Generator, view: CameraUnits) -> Episode:
         """An episode; everything in it follows from the generator."""
         raise NotImplementedError
 
-    def common(self, view: View) -> dict[str, Any]:
+    def common(self, view: CameraUnits) -> dict[str, Any]:
         """What every `Episode` of the task is made with, scene and target apart."""
         return {"success_px": self.success_side * view.side, "steps": view.steps(self.duration_s)}
+
+
+__getattr__ = old_names(__name__, {"View": "CameraUnits"})

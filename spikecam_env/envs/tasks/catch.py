@@ -11,10 +11,10 @@ from typing import ClassVar
 
 import numpy as np
 
-from scenes.discs import Discs, Path
+from scenes.discs import Discs, PiecewisePath
 from scenes.protocol import Gaze
 from spikecam_env.envs.episode import Episode, Standing
-from spikecam_env.envs.tasks.base import Task, View
+from spikecam_env.envs.tasks.base import CameraUnits, Task
 from spikecam_env.envs.tasks.things import BRIGHT, background, disc_of, number_of
 
 
@@ -55,7 +55,7 @@ class Catch(Task):
     frames_per_step: ClassVar[int] = 20
     axes: ClassVar[int] = 1
 
-    def draw(self, rng: np.random.Generator, view: View) -> Episode:
+    def draw(self, rng: np.random.Generator, view: CameraUnits) -> Episode:
         """See `Task.draw`."""
         seconds = rng.uniform(*self.crossing_s)
         away = min(self.away[1], self.reach(seconds - REACTION_S))
@@ -63,7 +63,9 @@ class Catch(Task):
         begin = np.array([view.middle[0] + view.side * rng.uniform(-self.spread, self.spread), self.start * view.side])
         crossing = np.array([to, self.line * view.side])
         frames = view.frames(seconds) + view.frames_per_step  # the first block is reset's
-        path = Path.straight((float(begin[0]), float(begin[1])), tuple((crossing - begin) / frames), 2 * frames)
+        path = PiecewisePath.straight(
+            (float(begin[0]), float(begin[1])), tuple((crossing - begin) / frames), 2 * frames
+        )
         ball = disc_of("plain", number_of(rng, view), self.radius * view.side, path)
         tile = background(number_of(rng, view), view.shape).copy()
         row = int(self.line * view.side)

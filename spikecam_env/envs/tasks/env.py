@@ -15,7 +15,7 @@ from spikecam_env.envs.episode import Episode
 from spikecam_env.envs.keywords import check_settled
 from spikecam_env.envs.reset_options import Rule, checked_options
 from spikecam_env.envs.tasks import TASKS
-from spikecam_env.envs.tasks.base import Task, View
+from spikecam_env.envs.tasks.base import CameraUnits, Task
 from spikecam_env.envs.tasks.things import TEST_PICTURES, TRAIN_PICTURES
 from spikecam_env.errors import InputError, shown, unknown_name
 
@@ -107,8 +107,8 @@ class TaskEnv(AimingEnv):
         rng = np.random.default_rng([numbers.start + number, self.task.stream])
         return replace(self.task.draw(rng, self._view_of(split)), number=number)
 
-    def _view_of(self, split: str) -> View:
-        return View(self.shape, self.model.frame_rate_hz, self.frames_per_step, SPLITS[split][1])
+    def _view_of(self, split: str) -> CameraUnits:
+        return CameraUnits(self.shape, self.model.frame_rate_hz, self.frames_per_step, SPLITS[split][1])
 
     def _of_standing(self) -> dict[str, Any]:
         return super()._of_standing() | {"episode_number": self.episode.number}

@@ -16,7 +16,7 @@ import numpy as np
 from scenes.derived import Derived
 from scenes.protocol import Gaze, Placed, Scene, Truth
 from spikecam_env.envs.episode import Episode, Standing
-from spikecam_env.envs.tasks.base import View
+from spikecam_env.envs.tasks.base import CameraUnits
 from spikecam_env.envs.tasks.track import Track
 from spikecam_env.sensor import Keyframes
 
@@ -47,7 +47,7 @@ class Exposure(Track):
     further: ClassVar[int] = 1
     stream: ClassVar[int] = 2
 
-    def draw(self, rng: np.random.Generator, view: View) -> Episode:
+    def draw(self, rng: np.random.Generator, view: CameraUnits) -> Episode:
         """See `Task.draw`."""
         plane = self.plane(rng, view)
         period, phase = view.frames(rng.uniform(*self.period_s)), rng.uniform(0, 2 * np.pi)

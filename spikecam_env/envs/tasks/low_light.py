@@ -10,7 +10,7 @@ import numpy as np
 from scenes.exposure import expose
 from scenes.protocol import Placed
 from spikecam_env.envs.episode import Episode
-from spikecam_env.envs.tasks.base import View
+from spikecam_env.envs.tasks.base import CameraUnits
 from spikecam_env.envs.tasks.track import Track
 
 
@@ -31,7 +31,7 @@ class LowLight(Track):
 
     stream: ClassVar[int] = 1
 
-    def draw(self, rng: np.random.Generator, view: View) -> Episode:
+    def draw(self, rng: np.random.Generator, view: CameraUnits) -> Episode:
         """See `Task.draw`."""
         shortest, longest = np.log(self.mean_interval)
         scene = expose(self.plane(rng, view), float(np.exp(rng.uniform(shortest, longest))))

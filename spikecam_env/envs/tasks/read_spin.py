@@ -10,7 +10,7 @@ import numpy as np
 from scenes.discs import Discs
 from spikecam_env.envs.episode import Episode, Standing
 from spikecam_env.envs.task import OUTCOME, PROGRESS
-from spikecam_env.envs.tasks.base import Task, View
+from spikecam_env.envs.tasks.base import CameraUnits, Task
 from spikecam_env.envs.tasks.things import background, disc_of, number_of, wander
 
 RPM = (1000.0, 2000.0, 4000.0, 8000.0)
@@ -50,7 +50,7 @@ class ReadSpin(Task):
     further: ClassVar[int] = 1 + answers
     stream: ClassVar[int] = 3
 
-    def draw(self, rng: np.random.Generator, view: View) -> Episode:
+    def draw(self, rng: np.random.Generator, view: CameraUnits) -> Episode:
         """See `Task.draw`."""
         speed = self.top_sides_s * rng.uniform(*self.speed)
         path = wander(rng, view, view.beside_middle(rng, *self.start), speed, self.duration_s, self.room)
@@ -58,7 +58,7 @@ class ReadSpin(Task):
         texture, rpm = self.shown(rng, truth)
         disc = disc_of(texture, number_of(rng, view), self.radius * view.side, path, rpm, angle)
         scene = Discs(view.shape, view.frame_rate_hz, background(number_of(rng, view), view.shape), {"disc": disc})
-        return Reading(scene, "disc", **self.common(view), truth=truth, answers=self.answers)
+        return ReadSpinEpisode(scene, "disc", **self.common(view), truth=truth, answers=self.answers)
 
     def shown(self, rng: np.random.Generator, truth: int) -> tuple[str, float]:
         """(texture, turns a minute) of the disc whose answer is number `truth`."""
@@ -66,7 +66,7 @@ class ReadSpin(Task):
 
 
 @dataclass(frozen=True, eq=False)
-class Reading(Episode):
+class ReadSpinEpisode(Episode):
     """An episode with a question."""
 
     truth: int = 0
@@ -80,7 +80,7 @@ class Reading(Episode):
     is_right: bool = False
     """Whether the right answer was given."""
 
-    def acted(self, rest: tuple[float, ...], standing: Standing, stop: int) -> Reading:
+    def acted(self, rest: tuple[float, ...], standing: Standing, stop: int) -> ReadSpinEpisode:
         """With the answer that was given, if it counts."""
         say, *numbers = rest
         step = standing.step + 1

@@ -8,7 +8,7 @@ import numpy as np
 
 from scenes.discs import Disc, Discs
 from spikecam_env.envs.episode import Episode, Reaching
-from spikecam_env.envs.tasks.base import Task, View
+from spikecam_env.envs.tasks.base import CameraUnits, Task
 from spikecam_env.envs.tasks.things import background, disc_of, number_of, wander
 
 CUE = "spokes"
@@ -41,7 +41,7 @@ class Saccade(Task):
     room: float = 0.6
     """Distance from the middle to the walls at which the discs turn back [shorter sides]."""
 
-    def draw(self, rng: np.random.Generator, view: View) -> Episode:
+    def draw(self, rng: np.random.Generator, view: CameraUnits) -> Episode:
         """See `Task.draw`."""
         first, kinds = rng.uniform(0, 2 * np.pi), rng.permutation([CUE, *OTHERS])
         x, y = view.middle

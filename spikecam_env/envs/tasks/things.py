@@ -12,11 +12,11 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from scenes.discs import Disc, Path
+from scenes.discs import Disc, PiecewisePath
 from scenes.drawing import Canvas
 from scenes.painted_disk import Texels, prefiltered
 from scenes.textures import Texture, blobs, fractal_noise
-from spikecam_env.envs.tasks.base import View
+from spikecam_env.envs.tasks.base import CameraUnits
 from spikecam_env.envs.tasks.digits import DIGITS, digit
 
 DARK, BRIGHT = 0.05, 0.6
@@ -32,12 +32,12 @@ TRAIN_PICTURES, TEST_PICTURES = range(64), range(64, 128)
 """Numbers of textures: no texture of a test is seen in training."""
 
 
-def disc_of(kind: str, number: int, radius: float, path: Path, rpm: float = 0.0, angle: float = 0.0) -> Disc:
+def disc_of(kind: str, number: int, radius: float, path: PiecewisePath, rpm: float = 0.0, angle: float = 0.0) -> Disc:
     """A disc with a texture of `TEXTURES`; radius [pixels]."""
     return Disc(_texels(kind, number, float(radius)), float(radius), path, rpm, angle)
 
 
-def number_of(rng: np.random.Generator, view: View) -> int:
+def number_of(rng: np.random.Generator, view: CameraUnits) -> int:
     """Of a texture of this split."""
     return int(rng.choice(view.pictures))
 
@@ -51,8 +51,8 @@ def background(number: int, shape: tuple[int, int]) -> NDArray[np.float32]:
 
 
 def wander(
-    rng: np.random.Generator, view: View, start: tuple[float, float], sides_s: float, seconds: float, room: float
-) -> Path:
+    rng: np.random.Generator, view: CameraUnits, start: tuple[float, float], sides_s: float, seconds: float, room: float
+) -> PiecewisePath:
     """A path at one speed whose heading turns at random and that bounces inside a box about the picture's middle.
 
     sides_s  speed [shorter sides/s];  room  from the middle to the box's walls [shorter sides]
@@ -64,7 +64,9 @@ def wander(
     free = np.asarray(start) - middle + step * np.cumsum(np.stack([np.cos(turns), np.sin(turns)], axis=1), axis=0)
     free = np.vstack([np.asarray(start) - middle, free])
     folded = half - np.abs((free + half) % (4 * half) - 2 * half)
-    return Path(np.arange(count + 1, dtype=np.float64) * view.frames(PIECE_S), np.asarray(middle + folded, np.float64))
+    return PiecewisePath(
+        np.arange(count + 1, dtype=np.float64) * view.frames(PIECE_S), np.asarray(middle + folded, np.float64)
+    )
 
 
 PIECE_S = 0.001

@@ -8,7 +8,7 @@ import numpy as np
 
 from scenes.discs import Discs
 from spikecam_env.envs.episode import Episode
-from spikecam_env.envs.tasks.base import Task, View
+from spikecam_env.envs.tasks.base import CameraUnits, Task
 from spikecam_env.envs.tasks.things import background, disc_of, number_of, wander
 
 
@@ -34,11 +34,11 @@ class Track(Task):
     room: float = 1.0
     """Distance from the middle to the walls at which the disc turns back [shorter sides]."""
 
-    def draw(self, rng: np.random.Generator, view: View) -> Episode:
+    def draw(self, rng: np.random.Generator, view: CameraUnits) -> Episode:
         """See `Task.draw`."""
         return Episode(self.plane(rng, view), "target", **self.common(view))
 
-    def plane(self, rng: np.random.Generator, view: View) -> Discs:
+    def plane(self, rng: np.random.Generator, view: CameraUnits) -> Discs:
         """The target and what is behind it."""
         speed = self.top_sides_s * rng.uniform(*self.speed)
         path = wander(rng, view, view.beside_middle(rng, *self.start), speed, self.duration_s, self.room)

@@ -19,7 +19,7 @@ from gymnasium.vector import AutoresetMode
 from gymnasium.vector.utils import batch_space
 from numpy.typing import ArrayLike, NDArray
 
-from spikecam_env.envs.observations import Blocks, Observation, View, block_shape, observation, restarted
+from spikecam_env.envs.observations import Blocks, CameraView, Observation, block_shape, observation, restarted
 from spikecam_env.envs.spike_camera import SpikeCameraEnv
 from spikecam_env.errors import InputError, NotReadyError
 from spikecam_env.sensor import Keyframes
@@ -100,12 +100,12 @@ class VectorObserveSpikes(gymnasium.vector.VectorObservationWrapper):
         return seen
 
 
-def viewed(space: spaces.Space[Any], env: Any) -> View:
+def viewed(space: spaces.Space[Any], env: Any) -> CameraView:
     """The camera whose blocks fill a space; raises InputError where they are no blocks of spikes."""
     frames, rows, columns = block_shape(space)
     one = getattr(env.unwrapped, "envs", [env])[0].unwrapped
-    rate = one.model.frame_rate_hz if isinstance(one, SpikeCameraEnv) else View.frame_rate_hz
-    return View((rows, columns), frames, rate)
+    rate = one.model.frame_rate_hz if isinstance(one, SpikeCameraEnv) else CameraView.frame_rate_hz
+    return CameraView((rows, columns), frames, rate)
 
 
 def light_on(env: gymnasium.Env) -> tuple[Keyframes | ArrayLike, ...]:

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
-from spikecam_env.campaign import Campaign, Take, record_takes
+from spikecam_env.campaign import Campaign, PlannedRecording, record_takes
 from spikecam_env.checked import checked_count, checked_disk, checked_shape
 from spikecam_env.gap.acquisition.recording_kinds import Bars, Dark, Disk, Flat, Planned, Step
 from spikecam_env.sensor import SensorModel
@@ -96,6 +96,8 @@ def second_voltage(recordings: Sequence[Planned], v_d: float) -> tuple[Planned, 
     return (*recordings, *(replace(p, v_d=v_d, name=p.name and f"{p.name}-at-{v_d:g}V") for p in again))
 
 
-def _take(planned: Planned, shape: tuple[int, int], frames: int) -> Take:
+def _take(planned: Planned, shape: tuple[int, int], frames: int) -> PlannedRecording:
     planned.check()
-    return Take(planned.file_name, planned.light(shape, frames), frames, planned.use, planned.v_d, planned.kind)
+    return PlannedRecording(
+        planned.file_name, planned.light(shape, frames), frames, planned.use, planned.v_d, planned.kind
+    )

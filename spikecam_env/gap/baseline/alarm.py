@@ -5,16 +5,14 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from spikecam_env.gap.compare.distance import adjusted, deviates, of_all_recordings
 from spikecam_env.gap.compare.prediction import Null
 from spikecam_env.gap.twins.case import Case
+from spikecam_env.types import Floats
 
-Array = NDArray[np.float64]
 
-
-def is_discrepant(null: Null, values: Array) -> bool:
+def is_discrepant(null: Null, values: Floats) -> bool:
     """Whether statistics (S,), NaN where they take no part, differ from the null model beyond chance."""
     z = deviates(null, values)
     smallest = adjusted(np.append(z, of_all_recordings(null.keys, z, "intervals"))).min()

@@ -10,9 +10,9 @@ import numpy as np
 from spikecam_env.campaign.reading import CampaignRecording
 from spikecam_env.gap.compare.prediction import Null, values_of
 from spikecam_env.gap.observe.conditions import Condition
-from spikecam_env.gap.observe.observation import Observation, observe
-from spikecam_env.gap.statistics import Key, statistics_bank
-from spikecam_env.gap.statistics.reading import Reading
+from spikecam_env.gap.observe.observation import ObservedRecording, observe
+from spikecam_env.gap.statistics import StatisticKey, statistics_bank
+from spikecam_env.gap.statistics.reading import CampaignReading
 from spikecam_env.gap.twins.case import Case
 from spikecam_env.gap.unit.refit import BaseFit
 
@@ -35,8 +35,8 @@ def floor_of_halves(case: Case, recordings: Sequence[CampaignRecording], null: N
     ]
     if not steady:
         return float("nan")
-    first: dict[Key, float] = {}
-    second: dict[Key, float] = {}
+    first: dict[StatisticKey, float] = {}
+    second: dict[StatisticKey, float] = {}
     for c, r in steady:
         bits, half = r.packed(), c.frames // 2
         for found, part in ((first, bits[:half]), (second, bits[half : 2 * half])):
@@ -46,8 +46,8 @@ def floor_of_halves(case: Case, recordings: Sequence[CampaignRecording], null: N
     return float(np.mean((np.where(np.isfinite(halves), halves**2, twins2) / null.noise**2)[held]))
 
 
-def _half_bank(base: BaseFit, condition: Condition, seen: Observation) -> dict[Key, float]:
+def _half_bank(base: BaseFit, condition: Condition, seen: ObservedRecording) -> dict[StatisticKey, float]:
     expected = base.gain * condition.picture + base.dark
     residual = np.where(expected > 0, seen.rate / np.where(expected > 0, expected, 1.0) - 1.0, np.nan)
     own = replace(base, residual=residual[None])
-    return statistics_bank(Reading([seen], [condition], own, {}))
+    return statistics_bank(CampaignReading([seen], [condition], own, {}))

@@ -10,7 +10,6 @@ from dataclasses import replace
 from itertools import combinations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from spikecam_env.gap.baseline.contradiction import Contradiction
 from spikecam_env.gap.baseline.missing_frames import dropped
@@ -22,8 +21,7 @@ from spikecam_env.gap.observe.conditions import Condition
 from spikecam_env.gap.twins.case import Case
 from spikecam_env.robust import scatter
 from spikecam_env.sensor import SensorModel
-
-Array = NDArray[np.float64]
+from spikecam_env.types import Floats
 
 FEWEST_LEVELS = 5
 """Steady recordings that show a mistake: two of a line, two that may be exchanged, and one more."""
@@ -55,7 +53,7 @@ def silent(case: Case, suspect: set[str]) -> list[Contradiction]:
     return found
 
 
-def _steady_levels(case: Case, suspect: set[str]) -> tuple[list[str], Array, Array]:
+def _steady_levels(case: Case, suspect: set[str]) -> tuple[list[str], Floats, Floats]:
     """Names, labels and mean rates of the uniform, steady recordings of known light below saturation."""
     rows = [
         (c.name, c.level, float(o.rate[case.base.live].mean()))
@@ -66,7 +64,7 @@ def _steady_levels(case: Case, suspect: set[str]) -> tuple[list[str], Array, Arr
     return [r[0] for r in rows], np.array([r[1] for r in rows]), np.array([r[2] for r in rows])
 
 
-def _bend(light: Array, rate: Array) -> tuple[float, Array]:
+def _bend(light: Floats, rate: Floats) -> tuple[float, Floats]:
     """Worst relative distance from the best straight line, and all of them."""
     weight = 1.0 / np.maximum(rate, 1e-6)
     design = np.stack([light, np.ones_like(light)], axis=1)

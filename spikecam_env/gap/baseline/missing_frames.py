@@ -7,11 +7,10 @@ from numpy.typing import NDArray
 
 from spikecam_env.gap.baseline.contradiction import Contradiction
 from spikecam_env.gap.observe.conditions import Condition
-from spikecam_env.gap.observe.observation import BIN, Observation
+from spikecam_env.gap.observe.observation import BIN, ObservedRecording
 from spikecam_env.gap.statistics.film import refitted_film
 from spikecam_env.gap.twins.case import Case
-
-Array = NDArray[np.float64]
+from spikecam_env.types import Floats
 
 MOST_BINS = 25
 """Largest shift of a moving recording against its light that is looked for [bins of the film]."""
@@ -37,7 +36,7 @@ def dropped(case: Case, suspect: set[str]) -> list[Contradiction]:
     return found
 
 
-def _jump_steady(case: Case, o: Observation) -> tuple[int, float] | None:
+def _jump_steady(case: Case, o: ObservedRecording) -> tuple[int, float] | None:
     """(frame, missing): intervals that span a gap are short by it; they end within an interval after it.
 
     A gap of half an interval makes some of them irregular, which are not timed, and lengthens the others.  Where more
@@ -64,7 +63,7 @@ def _jump_steady(case: Case, o: Observation) -> tuple[int, float] | None:
     return None
 
 
-def _jump_moving(case: Case, condition: Condition, o: Observation) -> tuple[int, float] | None:
+def _jump_moving(case: Case, condition: Condition, o: ObservedRecording) -> tuple[int, float] | None:
     """(frame, missing) from how late each segment of the film is against its light."""
     assert o.film is not None
     expected = refitted_film(condition, case.base)
@@ -92,7 +91,7 @@ def _jump_moving(case: Case, condition: Condition, o: Observation) -> tuple[int,
     return k * condition.frames // SEGMENTS, -steps[k - 1]
 
 
-def _bins_late(film: NDArray[np.uint8], expected: Array, part: NDArray[np.int64], same_share: float) -> int:
+def _bins_late(film: NDArray[np.uint8], expected: Floats, part: NDArray[np.int64], same_share: float) -> int:
     """Bins by which the light has to be moved on to agree best with a part of the film, the fewest that do as well; 0
     unless clearly better.  same_share: of what the best shift removes, what one removes that does as well."""
     seen = film[part].astype(np.float64)

@@ -28,11 +28,9 @@ import scipy
 from numpy.typing import NDArray
 
 from spikecam_env.gap.observe.conditions import STEADY, Condition
-from spikecam_env.gap.observe.observation import TIME_BLOCKS, Observation
+from spikecam_env.gap.observe.observation import TIME_BLOCKS, ObservedRecording
 from spikecam_env.gap.settings import Baseline, DiagnosisSettings, checked_settings
-
-Array = NDArray[np.float64]
-Mask = NDArray[np.bool_]
+from spikecam_env.types import Floats, Masks
 
 SIDES = (4, 8, 16)
 """Sides of the windows [pixels]: what is smaller is not found, what is larger in several."""
@@ -64,7 +62,7 @@ _TRIMS = 4
 
 
 @dataclass(frozen=True)
-class Motion:
+class DetectedMotion:
     """What moves in a recording.
 
     moving: (H, W) bool.  rows, columns: first and last of the largest connected region.  frames: first and last in
@@ -73,13 +71,13 @@ class Motion:
     """
 
     recording: str
-    moving: Mask
+    moving: Masks
     rows: tuple[int, int]
     columns: tuple[int, int]
     frames: tuple[int, int]
     contrast: float
     z: float
-    rate: Array
+    rate: Floats
     light_known: bool = False
 
     @property
@@ -102,7 +100,9 @@ class Motion:
         return {**{key: getattr(self, key) for key in shown}, "share": self.share}
 
 
-def find_motion(condition: Condition, seen: Observation, settings: DiagnosisSettings | None = None) -> Motion | None:
+def find_motion(
+    condition: Condition, seen: ObservedRecording, settings: DiagnosisSettings | None = None
+) -> DetectedMotion | None:
     """What moves in a recording of steady light; None where nothing does, or the light is known to change.
 
     In the dark nothing is shown that could move; what changes there is the camera.
@@ -122,19 +122,19 @@ def find_motion(condition: Condition, seen: Observation, settings: DiagnosisSett
     return _described(condition, found, seen, frames) if found else None
 
 
-def whole_blocks(seen: Observation) -> tuple[Array, int]:
+def whole_blocks(seen: ObservedRecording) -> tuple[Floats, int]:
     """(n, P) counts of the blocks that are whole, and their frames."""
     frames = -(-seen.frames // TIME_BLOCKS)
     return seen.blocks[: seen.frames // frames].astype(np.float64), frames
 
 
-def expected_variance(expected: Array) -> Array:
+def expected_variance(expected: Floats) -> Floats:
     """Variance of a static pixel's count, of which `expected` are expected."""
     part = np.mod(expected, 1.0)
     return part * (1.0 - part) + OWN_NOISE * np.minimum(expected, 1.0) + 1e-6
 
 
-def common_mode(counts: Array, mean: Array, use: Mask) -> Array:
+def common_mode(counts: Floats, mean: Floats, use: Masks) -> Floats:
     """(P,) counts that the level `mean` of a pixel lets expect in a block: the parabola through all pixels in `use`,
     fitted without those off it, since what moves is not common; one by less than FEW_SPIKES is not off."""
     level = mean / max(float(mean[use].mean()), 1e-9)
@@ -153,13 +153,13 @@ def common_mode(counts: Array, mean: Array, use: Mask) -> Array:
     return expected
 
 
-def of_one_level(level: Array, kept: Mask) -> list[NDArray[np.intp]]:
+def of_one_level(level: Floats, kept: Masks) -> list[NDArray[np.intp]]:
     """Flat indices of the pixels kept, of neighbouring levels together.  level: (P,) mean count."""
     order = np.flatnonzero(kept)[np.argsort(level[kept.reshape(-1)], kind="stable")]
     return np.array_split(order, max(order.size // PIXELS_OF_A_LEVEL, 1))
 
 
-def excess(deviates: Array, kept: Mask, groups: list[NDArray[np.intp]]) -> Array:
+def excess(deviates: Floats, kept: Masks, groups: list[NDArray[np.intp]]) -> Floats:
     """(P,) by how much more than 1 the deviates of neighbours scatter about each other, in each group; 1 at least.
 
     deviates: (n, H, W), of n parts of the time, each pixel's in its own standard deviations.
@@ -178,7 +178,7 @@ def excess(deviates: Array, kept: Mask, groups: list[NDArray[np.intp]]) -> Array
     return factor
 
 
-def without_bias(deviates: Array, groups: list[NDArray[np.intp]]) -> Array:
+def without_bias(deviates: Floats, groups: list[NDArray[np.intp]]) -> Floats:
     """Deviates (n, P) whose mean over each group and all parts of the time is 0: those of few spikes are skewed, so
     that a limit to what a pixel counts moves their mean."""
     centred = deviates.copy()
@@ -200,7 +200,7 @@ class _Window:
     contrast: float
 
 
-def _moving_windows(counts: Array, shape: tuple[int, int], kept: Mask, limits: Baseline) -> Iterator[_Window]:
+def _moving_windows(counts: Floats, shape: tuple[int, int], kept: Masks, limits: Baseline) -> Iterator[_Window]:
     """Windows in space and time whose pixels, of those `kept`, are off together beyond chance."""
     use = kept.reshape(-1)
     if len(counts) < 2 or not use.any():
@@ -222,8 +222,8 @@ def _moving_windows(counts: Array, shape: tuple[int, int], kept: Mask, limits: B
 
 
 def _deviations(
-    counts: Array, expected: Array, span: int, kept: Mask, groups: list[NDArray[np.intp]]
-) -> tuple[Array, ...]:
+    counts: Floats, expected: Floats, span: int, kept: Masks, groups: list[NDArray[np.intp]]
+) -> tuple[Floats, ...]:
     """(n, H, W) of n parts of the time of `span` blocks: spikes off, off as far as a pixel counts, their variance, and
     spikes expected; 0 where not `kept`."""
     firsts = range(0, len(counts) - span + 1, span)
@@ -242,7 +242,7 @@ def least_deviate(tests: int, limits: Baseline) -> float:
 
 
 def beyond(
-    planes: tuple[Array, ...], size: tuple[int, int], span: int, shared: float, least_z: float, limits: Baseline
+    planes: tuple[Floats, ...], size: tuple[int, int], span: int, shared: float, least_z: float, limits: Baseline
 ) -> Iterator[_Window]:
     """Windows of one size in parts of the time of `span` blocks.  planes: `_deviations`.  shared: variance of a pixel's
     count that is of events which pixels of a row share, times those that share one.
@@ -261,7 +261,7 @@ def beyond(
         yield _Window(int(rows[i]), int(columns[j]), *size, blocks, float(z[k, i, j]), float(contrast[k, i, j]))
 
 
-def shared_variance(planes: tuple[Array, ...], width: int) -> float:
+def shared_variance(planes: tuple[Floats, ...], width: int) -> float:
     """Variance of a pixel's count in a block, beside its own, in windows of a width [pixels]: of events that pixels of
     a row share, times those that share one, `width` at most.
 
@@ -272,13 +272,13 @@ def shared_variance(planes: tuple[Array, ...], width: int) -> float:
     return float(np.clip(along_rows - along_columns, 0.0, width - 1.0)) * _own_variance(planes)
 
 
-def _own_variance(planes: tuple[Array, ...]) -> float:
+def _own_variance(planes: tuple[Floats, ...]) -> float:
     """Mean variance of a pixel's count, of pixels that are looked at."""
     variance = planes[2][planes[2] > 0]
     return float(variance.mean()) if variance.size else 0.0
 
 
-def _scatter_of_strips(planes: tuple[Array, ...], size: tuple[int, int]) -> float:
+def _scatter_of_strips(planes: tuple[Floats, ...], size: tuple[int, int]) -> float:
     """Variance of strips of a size, from block to block, over that of their pixels."""
     _, capped, variance, _ = planes
     places = [np.arange(n - side + 1) for n, side in zip(capped.shape[1:], size, strict=True)]
@@ -294,21 +294,21 @@ def _starts(length: int, side: int) -> NDArray[np.int64]:
     return np.unique(np.append(np.arange(0, length - side + 1, max(side // 2, 1)), length - side))
 
 
-def _window_sums(planes: Array, rows: NDArray[np.int64], columns: NDArray[np.int64], size: tuple[int, int]) -> Array:
+def _window_sums(planes: Floats, rows: NDArray[np.int64], columns: NDArray[np.int64], size: tuple[int, int]) -> Floats:
     """(n, rows, columns) sums of planes (n, H, W) over windows."""
     total = np.pad(planes.cumsum(axis=1).cumsum(axis=2), ((0, 0), (1, 0), (1, 0)))
     strips = total[:, rows + size[0]] - total[:, rows]
     return np.asarray(strips[..., columns + size[1]] - strips[..., columns])
 
 
-def _union(windows: list[_Window], shape: tuple[int, int]) -> Mask:
+def _union(windows: list[_Window], shape: tuple[int, int]) -> Masks:
     moving = np.zeros(shape, bool)
     for w in windows:
         moving[w.row : w.row + w.height, w.column : w.column + w.width] = True
     return moving
 
 
-def _described(condition: Condition, found: list[_Window], seen: Observation, frames: int) -> Motion:
+def _described(condition: Condition, found: list[_Window], seen: ObservedRecording, frames: int) -> DetectedMotion:
     """The largest connected region, and when its windows are off."""
     moving = _union(found, seen.shape)
     regions, _ = scipy.ndimage.label(moving)
@@ -318,7 +318,7 @@ def _described(condition: Condition, found: list[_Window], seen: Observation, fr
     worst = max(mine, key=lambda w: abs(w.z))
     shortest = min(w.blocks[1] - w.blocks[0] for w in mine)
     when = [w.blocks for w in mine if w.blocks[1] - w.blocks[0] == shortest]
-    return Motion(
+    return DetectedMotion(
         recording=condition.name,
         moving=moving,
         rows=(int(row.min()), int(row.max())),

@@ -7,18 +7,16 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from spikecam_env.gap.compare.prediction import Null, null_of, values_of
 from spikecam_env.gap.observe.conditions import Condition
-from spikecam_env.gap.statistics import Key
+from spikecam_env.gap.statistics import StatisticKey
 from spikecam_env.gap.twins.case import Case, twins
 from spikecam_env.gap.twins.fresh_units import drawn_banks
 from spikecam_env.gap.unit.indirect_inference import inferred_unit
 from spikecam_env.gap.unit.refit import BaseFit, constrained_refit
 from spikecam_env.sensor import SensorModel
-
-Array = NDArray[np.float64]
+from spikecam_env.types import Floats
 
 
 def model_null(case: Case, model: SensorModel, count: int) -> Null:
@@ -57,7 +55,7 @@ def unit_under(case: Case, model: SensorModel) -> BaseFit:
     return base
 
 
-def with_more_twins(null: Null, more: Sequence[Mapping[Key, float]]) -> Null:
+def with_more_twins(null: Null, more: Sequence[Mapping[StatisticKey, float]]) -> Null:
     """The null with further twins of some recordings, for the statistics of these."""
     values = np.array([*(d.values for d in null.draws), *(values_of(bank, null.keys) for bank in more)])
     known = np.isfinite(values).all(axis=0)
@@ -70,7 +68,7 @@ def with_more_twins(null: Null, more: Sequence[Mapping[Key, float]]) -> Null:
     )
 
 
-def recordings_per_statistic(keys: Sequence[Key], conditions: Sequence[Condition]) -> Array:
+def recordings_per_statistic(keys: Sequence[StatisticKey], conditions: Sequence[Condition]) -> Floats:
     """(S,) recordings of use fit with the same statistic of the one fixed pattern, dark or lit, counted; 1 at least."""
     lit = {c.name: c.kind != "dark" for c in conditions}
     fit = {c.name for c in conditions if c.use == "fit"}

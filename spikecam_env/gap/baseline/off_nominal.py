@@ -14,8 +14,7 @@ from spikecam_env.gap.twins.fresh_units import SPREAD_PARAMETERS, spread_factor,
 from spikecam_env.gap.unit.refit import NOISE, BaseFit
 from spikecam_env.gap.unit.usual import unusual
 from spikecam_env.sensor import CATALOGUE, SensorModel
-
-Array = NDArray[np.float64]
+from spikecam_env.types import Floats
 
 
 @dataclass(frozen=True)
@@ -65,7 +64,7 @@ def off_nominal(case: Case, model: SensorModel, base: BaseFit) -> OffNominal:
     return OffNominal(rows, base)
 
 
-def level_off(values: Array, nominal: Array) -> float:
+def level_off(values: Floats, nominal: Floats) -> float:
     """Ratio of two levels over pixels: of their medians or of their means, whichever is nearer to 1; 1 between both.
 
     Two distributions of another form, as of dark currents with a tail, differ by one of these and are of one level.
@@ -75,7 +74,7 @@ def level_off(values: Array, nominal: Array) -> float:
     return low if low > 1.0 else min(high, 1.0)
 
 
-def narrowed(values: Array, live: NDArray[np.bool_], factor: float) -> Array:
+def narrowed(values: Floats, live: NDArray[np.bool_], factor: float) -> Floats:
     """(P,) values with their distance from the median of the live ones divided by a factor."""
     middle = float(np.median(values[live]))
     return np.maximum(middle + (values - middle) / max(factor, 1e-3), 0.0)

@@ -3,14 +3,12 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from spikecam_env.gap.baseline.contradiction import Contradiction
 from spikecam_env.gap.settings import Searching
 from spikecam_env.gap.statistics.film import refitted_film
 from spikecam_env.gap.twins.case import Case
-
-Array = NDArray[np.float64]
+from spikecam_env.types import Floats
 
 _BACK, _ALL = slice(None, None, -1), slice(None)
 ORIENTATIONS = {
@@ -33,7 +31,7 @@ def flipped(case: Case, suspect: set[str]) -> list[Contradiction]:
     return found
 
 
-def _seen_and_expected(case: Case, i: int) -> tuple[Array, Array] | None:
+def _seen_and_expected(case: Case, i: int) -> tuple[Floats, Floats] | None:
     """(n, H, W) of recording i: its film and that of the refitted unit, or its rates and those of the other flats."""
     c, o, least = case.conditions[i], case.observations[i], case.settings.searching.least_spikes
     if c.light is None or o.times.count.sum() < least:
@@ -52,7 +50,7 @@ def _seen_and_expected(case: Case, i: int) -> tuple[Array, Array] | None:
     return o.rate.reshape(1, *case.shape), expected.reshape(1, *case.shape)
 
 
-def _better_turn(seen: Array, expected: Array, settings: Searching) -> tuple[str, float, float] | None:
+def _better_turn(seen: Floats, expected: Floats, settings: Searching) -> tuple[str, float, float] | None:
     """(turn, correlation turned, correlation as it is) of the first turn that agrees better, in time or summed: by no
     little correlation, and with more than half of the way to 1."""
     whole = (seen, expected), (seen.sum(axis=0)[None], expected.sum(axis=0)[None])
@@ -64,6 +62,6 @@ def _better_turn(seen: Array, expected: Array, settings: Searching) -> tuple[str
     return None
 
 
-def _correlation(a: Array, b: Array) -> float:
+def _correlation(a: Floats, b: Floats) -> float:
     a, b = a - a.mean(), b - b.mean()
     return float((a * b).sum() / max(np.sqrt((a * a).sum() * (b * b).sum()), 1e-30))

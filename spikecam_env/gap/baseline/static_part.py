@@ -8,9 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from spikecam_env.campaign.reading import CampaignRecording
-from spikecam_env.gap.baseline.motion import Motion, find_motion
+from spikecam_env.gap.baseline.motion import DetectedMotion, find_motion
 from spikecam_env.gap.observe.conditions import Condition
-from spikecam_env.gap.observe.observation import Observation, observe
+from spikecam_env.gap.observe.observation import ObservedRecording, observe
 from spikecam_env.gap.settings import DiagnosisSettings
 
 
@@ -20,12 +20,12 @@ class Observed:
 
     recordings: tuple[CampaignRecording, ...]
     conditions: tuple[Condition, ...]
-    seen: tuple[Observation, ...]
+    seen: tuple[ObservedRecording, ...]
 
 
 def without_motion(
     observed: Observed, *, static_only: bool, settings: DiagnosisSettings
-) -> tuple[Observed, tuple[Motion, ...]]:
+) -> tuple[Observed, tuple[DetectedMotion, ...]]:
     """What was observed without what moves, and what moves.
 
     Without recordings where that cannot be left out: it is not to be (`static_only`), light said to be known changes,
@@ -47,7 +47,7 @@ def without_motion(
     return Observed(observed.recordings, tuple(conditions), tuple(seen)), motion
 
 
-def static_pixels(motion: tuple[Motion, ...]) -> NDArray[np.bool_]:
+def static_pixels(motion: tuple[DetectedMotion, ...]) -> NDArray[np.bool_]:
     """(H, W) bool: pixels that move in none of the recordings."""
     return np.asarray(~np.logical_or.reduce([m.moving for m in motion]))
 

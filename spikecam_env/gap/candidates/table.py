@@ -9,7 +9,7 @@ from dataclasses import dataclass, fields
 from spikecam_env.checked import each_once
 from spikecam_env.errors import unknown_name
 from spikecam_env.gap.observe.conditions import STEADY_KNOWN, Condition
-from spikecam_env.gap.observe.observation import Observation
+from spikecam_env.gap.observe.observation import ObservedRecording
 from spikecam_env.sensor import CATALOGUE, Effect, SensorModel
 from spikecam_env.sensor.effects.identification import Identification, Needs
 
@@ -159,7 +159,7 @@ class Candidates:
 
 
 def expected_events(
-    name: str, parameters: Mapping[str, float], shown: Sequence[Condition], seen: Sequence[Observation]
+    name: str, parameters: Mapping[str, float], shown: Sequence[Condition], seen: Sequence[ObservedRecording]
 ) -> float:
     """Pixels, spikes or frames of pixels that an effect is expected to change in the steady recordings to fit of a
     campaign; infinite where it is no share of such."""

@@ -7,30 +7,28 @@ from collections.abc import Sequence
 
 import numpy as np
 import scipy
-from numpy.typing import NDArray
 
 from spikecam_env.gap.compare.prediction import Null, Prediction, total_variance
-from spikecam_env.gap.statistics import Key
+from spikecam_env.gap.statistics import StatisticKey
+from spikecam_env.types import Floats
 
-Array = NDArray[np.float64]
 
-
-def effect_size(null: Null, measured: Array, change: Array) -> float:
+def effect_size(null: Null, measured: Floats, change: Floats) -> float:
     """Largest change among the measured statistics (S,), in units of their noise."""
     return float(np.max(np.where(np.isfinite(measured), np.abs(change), 0.0) / null.noise))
 
 
-def in_noise(null: Null, values: Array, mean: Array | None = None) -> Array:
+def in_noise(null: Null, values: Floats, mean: Floats | None = None) -> Floats:
     """(S,) how far values lie from a mean, by default the null model's, in the null model's noise; 0 where unknown."""
     return np.nan_to_num((values - (null.mean if mean is None else mean)) / null.noise)
 
 
-def deviates(null: Null, values: Array) -> Array:
+def deviates(null: Null, values: Floats) -> Floats:
     """(S,) normal deviates from Student's t with the freedom of few twins; 0 where unknown."""
     return normal_deviates(null, in_noise(null, values))
 
 
-def normal_deviates(null: Null, t: Array, predicted: Prediction | None = None) -> Array:
+def normal_deviates(null: Null, t: Floats, predicted: Prediction | None = None) -> Floats:
     """(S,) normal deviates of distances in noise, of a prediction or of the null model.
 
     The noise is estimated from few twins, and has more degrees of freedom where part of it is floor.  A distance that n
@@ -46,7 +44,7 @@ def normal_deviates(null: Null, t: Array, predicted: Prediction | None = None) -
     return np.asarray(np.sign(t) * -scipy.special.ndtri_exp(log_p))
 
 
-def share_beyond(t: Array, apart: Array) -> Array:
+def share_beyond(t: Floats, apart: Floats) -> Floats:
     """(S,) share of drawn units, half at most, that lie as far to the same side as a distance; 0 where none does.
     apart: (U, S) their own distances, NaN where they show nothing.
 
@@ -56,7 +54,7 @@ def share_beyond(t: Array, apart: Array) -> Array:
     return np.where(beyond > 0, np.minimum((beyond + 1) / (len(apart) + 1), 0.5), 0.0)
 
 
-def freedom_of(null: Null, predicted: Prediction) -> Array:
+def freedom_of(null: Null, predicted: Prediction) -> Floats:
     """(S,) degrees of freedom of a prediction's spread (Welch and Satterthwaite).
 
     The null's part has the null's freedom; the excess of the effect's twins has that of few twins, `half_pooled`, or of
@@ -72,7 +70,7 @@ def freedom_of(null: Null, predicted: Prediction) -> Array:
     return np.asarray((1.0 + beyond) ** 2 / (1.0 / null.freedom + beyond**2 / few))
 
 
-def of_all_recordings(keys: Sequence[Key], z: Array, group: str) -> Array:
+def of_all_recordings(keys: Sequence[StatisticKey], z: Floats, group: str) -> Floats:
     """(n,) normal deviates of each statistic of a group over all recordings together, where z is not 0 (Stouffer): two
     events in every recording are chance in none, and none in all."""
     names = list(dict.fromkeys(k.name for k in keys if k.group == group))
@@ -80,7 +78,7 @@ def of_all_recordings(keys: Sequence[Key], z: Array, group: str) -> Array:
     return np.array([v.sum() / np.sqrt(max(int(np.count_nonzero(v)), 1)) for v in of])
 
 
-def adjusted(z: Array) -> Array:
+def adjusted(z: Floats) -> Floats:
     """(S,) two-sided p-values, adjusted by Holm's step-down for the number of statistics."""
     p = 2.0 * scipy.special.ndtr(-np.abs(z))
     order = np.argsort(p)
@@ -90,17 +88,17 @@ def adjusted(z: Array) -> Array:
     return np.asarray(out)
 
 
-def is_significant(null: Null, rho: Array, predicted: Prediction | None = None) -> bool:
+def is_significant(null: Null, rho: Floats, predicted: Prediction | None = None) -> bool:
     """Whether the residuals of a prediction, or of the null model, are beyond chance."""
     return bool(adjusted(normal_deviates(null, rho, predicted)).min() < null.settings.judging.gate)
 
 
-def residual(null: Null, measured: Array, predicted: Prediction) -> Array:
+def residual(null: Null, measured: Floats, predicted: Prediction) -> Floats:
     """(S,) measured less predicted in noise."""
     return np.nan_to_num((measured - predicted.mean) / np.sqrt(total_variance(null, predicted)))
 
 
-def residual_and_misfit(null: Null, measured: Array, predicted: Prediction) -> tuple[Array, float]:
+def residual_and_misfit(null: Null, measured: Floats, predicted: Prediction) -> tuple[Floats, float]:
     """(residual, misfit).  The misfit is a deviance: the heavy-tailed sum of squared residuals, plus the logarithm of
     the variance over the null's.  Without that term a prediction would win by being vague.  Statistics that were not
     measured (NaN, held out) do not count.
@@ -111,11 +109,11 @@ def residual_and_misfit(null: Null, measured: Array, predicted: Prediction) -> t
     return rho, loss(null, rho) + float(log_variance.sum())
 
 
-def loss(null: Null, rho: Array) -> float:
+def loss(null: Null, rho: Floats) -> float:
     """Heavy-tailed sum of squares of residuals (S,), by the weights and the settings of a null model."""
     return robust_squares(rho, null.settings.judging.heavy, null.weight)
 
 
-def robust_squares(rho: Array, heavy: float, weight: Array | float = 1.0) -> float:
+def robust_squares(rho: Floats, heavy: float, weight: Floats | float = 1.0) -> float:
     """Heavy-tailed sum of squares; about the sum of the weights for noise alone.  heavy: degrees of freedom."""
     return float(np.sum(weight * (heavy + 1.0) * np.log1p(rho**2 / heavy)))

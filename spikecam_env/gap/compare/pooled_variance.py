@@ -12,11 +12,9 @@ from collections.abc import Sequence
 
 import numpy as np
 import scipy
-from numpy.typing import NDArray
 
-from spikecam_env.gap.statistics import Key, floor_family
-
-Array = NDArray[np.float64]
+from spikecam_env.gap.statistics import StatisticKey, floor_family
+from spikecam_env.types import Floats
 
 FEWEST_FREEDOM = 4
 """Degrees of freedom of a scatter from which the spread of variances within a kind is estimated, at least."""
@@ -25,7 +23,7 @@ MOST_FREEDOM = 2000.0
 """Degrees of freedom of a variance at most."""
 
 
-def moderated(keys: Sequence[Key], variances: Array, freedom: float) -> tuple[Array, Array]:
+def moderated(keys: Sequence[StatisticKey], variances: Floats, freedom: float) -> tuple[Floats, Floats]:
     """((S,) variances, (S,) degrees of freedom) from (S,) sample variances with `freedom` each.
 
     A statistic's kind is the same one of all recordings; how closely a kind's variances agree is estimated from all
@@ -50,12 +48,12 @@ def moderated(keys: Sequence[Key], variances: Array, freedom: float) -> tuple[Ar
     return out, degrees
 
 
-def one_of_each(names: Sequence[str]) -> Array:
+def one_of_each(names: Sequence[str]) -> Floats:
     """(S, n) 1 where a statistic has that name."""
     return np.array([[name == other for other in dict.fromkeys(names)] for name in names], dtype=np.float64)
 
 
-def shrunk(logs: Array, like: Array, chance: float) -> tuple[Array, float]:
+def shrunk(logs: Floats, like: Floats, chance: float) -> tuple[Floats, float]:
     """((S,) logarithms drawn to what those like them say, the variance of their error): `like` (S, n) says how they
     are, chance is the variance of each by itself."""
     fitted = like @ np.linalg.lstsq(like, logs)[0]

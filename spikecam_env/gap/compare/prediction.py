@@ -10,10 +10,9 @@ from numpy.typing import NDArray
 
 from spikecam_env.gap.compare.pooled_variance import moderated
 from spikecam_env.gap.settings import DiagnosisSettings, checked_settings
-from spikecam_env.gap.statistics import Key, floor_of
+from spikecam_env.gap.statistics import StatisticKey, floor_of
 from spikecam_env.gap.unit.refit import BaseFit
-
-Array = NDArray[np.float64]
+from spikecam_env.types import Floats
 
 PAIR_NOISE = {"rates": 0.15, "noise": 0.2, "rows": 0.3, "intervals": 0.5, "neighbours": 0.5, "drift": 0.6,
               "spectrum": 0.7, "timing": 1.0, "step": 1.2, "moving": 1.2}  # fmt: skip
@@ -31,9 +30,9 @@ class Draw:
     """
 
     number: int
-    values: Array
+    values: Floats
     refit: BaseFit | None
-    pattern: Array | None = None
+    pattern: Floats | None = None
 
 
 @dataclass(frozen=True)
@@ -45,12 +44,12 @@ class Prediction:
     units: (U, S) of the drawn units that the pattern was learnt from, NaN elsewhere; of all models by the same draws.
     """
 
-    mean: Array
-    error: Array
-    spread: Array
+    mean: Floats
+    error: Floats
+    spread: Floats
     draws: tuple[Draw, ...] = ()
-    own: Array | None = None
-    units: Array | None = None
+    own: Floats | None = None
+    units: Floats | None = None
 
 
 @dataclass(frozen=True)
@@ -63,18 +62,18 @@ class Null:
     settings: by which distances from it are judged.
     """
 
-    keys: tuple[Key, ...]
-    mean: Array
-    sd: Array
-    floor: Array
-    twins: Array | int
-    freedom: Array | float
-    weight: Array | float = 1.0
+    keys: tuple[StatisticKey, ...]
+    mean: Floats
+    sd: Floats
+    floor: Floats
+    twins: Floats | int
+    freedom: Floats | float
+    weight: Floats | float = 1.0
     draws: tuple[Draw, ...] = ()
     settings: DiagnosisSettings = field(default_factory=DiagnosisSettings)
 
     @property
-    def noise(self) -> Array:
+    def noise(self) -> Floats:
         """(S,) standard deviation of measured less mean."""
         return np.sqrt(self.sd**2 * (1.0 + 1.0 / self.twins) + self.floor**2)
 
@@ -85,8 +84,8 @@ class Null:
 
 
 def null_of(
-    banks: Sequence[Mapping[Key, float]],
-    keys: Sequence[Key],
+    banks: Sequence[Mapping[StatisticKey, float]],
+    keys: Sequence[StatisticKey],
     refits: Sequence[BaseFit] = (),
     settings: DiagnosisSettings | None = None,
 ) -> Null:
@@ -141,12 +140,12 @@ def with_pattern_moved(null: Null, made: Draw) -> Draw:
     return replace(made, values=np.where(np.abs(moved) > null.sd, without.values + moved, made.values))
 
 
-def pair_noise_share(keys: Sequence[Key]) -> Array:
+def pair_noise_share(keys: Sequence[StatisticKey]) -> Floats:
     """(S,) PAIR_NOISE of each statistic."""
     return np.array([PAIR_NOISE.get(k.group, 1.0) for k in keys])
 
 
-def own_variance(null: Null, predicted: Prediction) -> Array:
+def own_variance(null: Null, predicted: Prediction) -> Floats:
     """(S,) of a prediction's mean, beyond what the null's own mean has."""
     return np.maximum(predicted.error**2 - null.sd**2 / null.twins, 0.0)
 
@@ -160,29 +159,29 @@ def with_change_scaled(null: Null, one: Prediction, factor: float) -> Prediction
     return replace(one, mean=mean, error=np.sqrt(error2), spread=np.sqrt(spread2), own=own)
 
 
-def values_of(bank: Mapping[Key, float], keys: Sequence[Key]) -> Array:
+def values_of(bank: Mapping[StatisticKey, float], keys: Sequence[StatisticKey]) -> Floats:
     """(S,) in the order of keys; NaN where the bank has none."""
     return np.array([bank.get(k, np.nan) for k in keys])
 
 
-def total_variance(null: Null, predicted: Prediction) -> Array:
+def total_variance(null: Null, predicted: Prediction) -> Floats:
     """(S,) variance of measured less predicted; a prediction is exact to the tolerance of its effect."""
     return predicted.spread**2 + predicted.error**2 + null.floor**2 + law_error(null, predicted) ** 2
 
 
-def law_error(null: Null, predicted: Prediction) -> Array:
+def law_error(null: Null, predicted: Prediction) -> Floats:
     """(S,) error of a prediction's laws."""
     return null.settings.judging.tolerance * (predicted.mean - null.mean if predicted.own is None else predicted.own)
 
 
-def pooled(keys: Sequence[Key], values: Array) -> Array:
+def pooled(keys: Sequence[StatisticKey], values: Floats) -> Floats:
     """(S,) each statistic's mean over all recordings."""
     of = {kind: i for i, kind in enumerate(dict.fromkeys((k.group, k.name) for k in keys))}
     kind = np.array([of[k.group, k.name] for k in keys])
     return np.asarray((np.bincount(kind, values) / np.bincount(kind))[kind])
 
 
-def spread_of(null: Null, values: Array) -> Array:
+def spread_of(null: Null, values: Floats) -> Floats:
     """(S,) standard deviation of statistics under a model with an effect, from its twins (n, S), at least the null's.
 
     Rare events make statistics noisier than under the null model.
@@ -192,7 +191,7 @@ def spread_of(null: Null, values: Array) -> Array:
     return np.asarray(np.sqrt(np.maximum(null.sd**2, half_pooled(null, values.var(axis=0, ddof=1)))))
 
 
-def half_pooled(null: Null, variances: Array) -> Array:
+def half_pooled(null: Null, variances: Floats) -> Floats:
     """(S,) variances from few twins: half the statistic's own, half that of the same statistic over all recordings."""
     known = null.sd**2 + null.floor**2
     return 0.5 * variances + 0.5 * known * pooled(null.keys, variances) / pooled(null.keys, known)

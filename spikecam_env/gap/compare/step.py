@@ -18,8 +18,7 @@ from spikecam_env.gap.compare.prediction import (
     with_change_scaled,
 )
 from spikecam_env.gap.settings import Judging
-
-Array = NDArray[np.float64]
+from spikecam_env.types import Floats
 
 ERROR_DAMPING = 5e-4
 """Damping of the normal matrix that errors follow from: a step may be held back, an error must not be.  What it holds
@@ -29,7 +28,7 @@ MEDIAN_SQUARE = 0.455
 """Of the square of a normal deviate."""
 
 
-def likeliest(null: Null, measured: Array, one: Prediction) -> tuple[float, float]:
+def likeliest(null: Null, measured: Floats, one: Prediction) -> tuple[float, float]:
     """(factor, sd of its logarithm) that suits a prediction best which mostly scatters: by the misfit, with its
     term for the spread."""
     factors = np.geomspace(0.01, 100.0, 200)
@@ -40,12 +39,12 @@ def likeliest(null: Null, measured: Array, one: Prediction) -> tuple[float, floa
 
 def step_of(
     null: Null,
-    measured: Array,
+    measured: Floats,
     predicted: Prediction,
-    jacobian: Array,
-    noise: Array | float = 0.0,
-    before: Array | float = 1.0,
-) -> tuple[Array, Array]:
+    jacobian: Floats,
+    noise: Floats | float = 0.0,
+    before: Floats | float = 1.0,
+) -> tuple[Floats, Floats]:
     """(step (n,), covariance (n, n)): robust, slightly damped least squares for a jacobian (S, n).
 
     noise: (S, n) of the jacobian.  before: (n,) prior standard deviation, of what the statistics leave open.
@@ -83,7 +82,7 @@ def step_of(
     return np.asarray(step, np.float64), np.atleast_2d(total)
 
 
-def chance_of_normal_matrix(w: Array, jacobian: Array, noise: Array | float) -> Array:
+def chance_of_normal_matrix(w: Floats, jacobian: Floats, noise: Floats | float) -> Floats:
     """(n, n) of a normal matrix with weights (S,), that the noise of its jacobian makes: each column is a twin less one
     that they share.  noise: (S, n) of both, with the sign of the step between them."""
     there = noise * (jacobian != 0)
@@ -91,18 +90,18 @@ def chance_of_normal_matrix(w: Array, jacobian: Array, noise: Array | float) -> 
     return np.asarray(shared + np.diag(np.diag(shared)))
 
 
-def principal_directions(normal: Array, scale: Array) -> tuple[Array, Array]:
+def principal_directions(normal: Floats, scale: Floats) -> tuple[Floats, Floats]:
     """((n,) what is known, ERROR_DAMPING at least, (n, n) directions in units of 1 / `scale` (n,), one a row)."""
     values, vectors = np.linalg.eigh(normal / np.outer(scale, scale))
     return np.maximum(values, 0.0) + ERROR_DAMPING, vectors.T * scale
 
 
-def step_covariance(solve: Array, draws: Sequence[Array] | Array) -> Array:
+def step_covariance(solve: Floats, draws: Sequence[Floats] | Floats) -> Floats:
     """(n, n) covariance of where campaigns such as these (S,), not their mean, lead a step (n,) = solve @ values."""
     return np.atleast_2d(np.cov((np.nan_to_num(draws) @ solve.T).T)) * (1 + 1 / len(draws))
 
 
-def own_step_covariance(null: Null, predicted: Prediction, solve: Array) -> Array:
+def own_step_covariance(null: Null, predicted: Prediction, solve: Floats) -> Floats:
     """(n, n) covariance of a step by the effect's own chance: of its draws where as many as in the end
     move a statistic, of drawn units where they show it, elsewhere as of independent ones."""
     variances = np.maximum(predicted.spread**2 + predicted.error**2 - null.sd**2 * (1 + 1 / null.twins), 0.0)
@@ -116,7 +115,7 @@ def own_step_covariance(null: Null, predicted: Prediction, solve: Array) -> Arra
     return total + step_covariance(solve * shown, predicted.units) if predicted.units is not None else total
 
 
-def slope_of(null: Null, measured: Array, there: Prediction, here: Prediction, step: float) -> Array:
+def slope_of(null: Null, measured: Floats, there: Prediction, here: Prediction, step: float) -> Floats:
     """(S,) change of predictions over `step`, 0 where it is not clear of the twins' own noise: hundreds of statistics
     that do not move would drown those that do (regression dilution)."""
     change, _, clear = change_of(null, measured, there, here)
@@ -124,8 +123,8 @@ def slope_of(null: Null, measured: Array, there: Prediction, here: Prediction, s
 
 
 def change_of(
-    null: Null, measured: Array, there: Prediction, here: Prediction
-) -> tuple[Array, Array, NDArray[np.bool_]]:
+    null: Null, measured: Floats, there: Prediction, here: Prediction
+) -> tuple[Floats, Floats, NDArray[np.bool_]]:
     """((S,) change from one prediction to another, (S,) its noise, (S,) where it is clear of that).  What was not
     measured (NaN), and may move more, is a matter of its own."""
     change, known = there.mean - here.mean, np.isfinite(measured)
@@ -140,7 +139,7 @@ def change_of(
     return change, np.sqrt(own2), clear
 
 
-def scale_of(gap: Array, effect: Array, of_gap: Array, of_effect: Array, judging: Judging) -> tuple[float, float]:
+def scale_of(gap: Floats, effect: Floats, of_gap: Floats, of_effect: Floats, judging: Judging) -> tuple[float, float]:
     """(scale, sd): by how much to multiply an effect's change of the statistics to come nearest to the measured one.
 
     gap, effect: (S,) measured and simulated change.  of_gap, of_effect: (S,) their variances.  judging: the loss, and
@@ -169,14 +168,14 @@ def scale_of(gap: Array, effect: Array, of_gap: Array, of_effect: Array, judging
     return best[1], best[2]
 
 
-def scale_to(null: Null, measured: Array, predicted: Prediction) -> tuple[float, float]:
+def scale_to(null: Null, measured: Floats, predicted: Prediction) -> tuple[float, float]:
     """(scale, sd) of a prediction's change from the null that comes nearest to the measured one."""
     known = np.isfinite(measured)
     gap, effect = (np.where(known, v - null.mean, 0.0) for v in (measured, predicted.mean))
     return scale_of(gap, effect, null.noise**2, own_variance(null, predicted), null.settings.judging)
 
 
-def is_clear(effect: Array, variance: Array, judging: Judging) -> NDArray[np.bool_]:
+def is_clear(effect: Floats, variance: Floats, judging: Judging) -> NDArray[np.bool_]:
     """(S,) whether an effect stands clear of noise on a statistic, or, where it does on none, nearly as well as on its
     best: of 600 statistics a few are 4 noises off by chance."""
     size = np.abs(effect) / np.sqrt(variance)

@@ -11,7 +11,6 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from spikecam_env.gap.candidates.strength import amplified, bounded, with_effect
 from spikecam_env.gap.candidates.table import candidate
@@ -23,8 +22,7 @@ from spikecam_env.gap.fit.recordings import twins_of
 from spikecam_env.gap.unit.indirect_inference import extrapolated_unit, has_converged
 from spikecam_env.gap.unit.refit import BaseFit, constrained_refit
 from spikecam_env.sensor import SensorModel
-
-Array = NDArray[np.float64]
+from spikecam_env.types import Floats
 
 LEAST_FACTOR = 1e-3
 """Least factor by which a strength is multiplied at once; and that of a strength whose fit does not go on."""
@@ -42,7 +40,7 @@ class Fit:
     sd: dict[str, float]
     prediction: Prediction
     base: BaseFit
-    rho: Array
+    rho: Floats
     misfit: float
     model: SensorModel
 
@@ -53,7 +51,7 @@ class Fit:
 
 
 def fit(
-    problem: Problem, name: str, start: Mapping[str, float], expected: Array | None = None, white: float = 1.0
+    problem: Problem, name: str, start: Mapping[str, float], expected: Floats | None = None, white: float = 1.0
 ) -> Fit:
     """Best fit of one candidate's strength (of a pattern, all its parameters) added to the model.
 
@@ -67,7 +65,7 @@ def fit(
     return _fit_twins(problem, name, dict(start), expected, white)
 
 
-def _fit_twins(problem: Problem, name: str, parameters: dict[str, float], expected: Array | None, white: float) -> Fit:
+def _fit_twins(problem: Problem, name: str, parameters: dict[str, float], expected: Floats | None, white: float) -> Fit:
     """Twins at the start, made stronger until they show, once more where the unit settles far off, scaled until the
     strength is right to a third and the unit has settled; the last step is a scaling of what was simulated, without
     another twin."""
@@ -82,7 +80,7 @@ def _fit_twins(problem: Problem, name: str, parameters: dict[str, float], expect
     least = problem.misfit() - problem.settings.deviance.compare
     only = problem.affected([name], expected * times)
     last: tuple[float, Prediction] | None = None
-    slope: Array | None = None
+    slope: Floats | None = None
     settled_once = False
     for turn in range(fitting.most_tries):
         at_last = turn == fitting.most_tries - 1
@@ -140,7 +138,7 @@ def until_visible(name: str, parameters: dict[str, float], size: float, visible:
     return bounded(name, {**parameters, strength: parameters[strength] * more})
 
 
-def factor_to(problem: Problem, name: str, predicted: Prediction, scale: float, slope: Array | None) -> float:
+def factor_to(problem: Problem, name: str, predicted: Prediction, scale: float, slope: Floats | None) -> float:
     """By how much to multiply a strength: along its slope where there is one, else by what scales its change best; a
     tenth where that is negative and the strength cannot be."""
     if slope is not None:
@@ -154,7 +152,7 @@ def factor_to(problem: Problem, name: str, predicted: Prediction, scale: float, 
 
 def slope_between(
     problem: Problem, one: tuple[float, Prediction] | None, other: tuple[float, Prediction]
-) -> Array | None:
+) -> Floats | None:
     """(S,) change of the statistics for one more of a strength's logarithm, by twins at two of them; None where these
     are not two.  What goes with the square of a strength saturates where other noise is, or is a logarithm of both."""
     if (

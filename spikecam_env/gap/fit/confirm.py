@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from spikecam_env.gap.candidates.strength import amplified, with_effect
 from spikecam_env.gap.candidates.table import Candidates, candidate
@@ -19,8 +18,6 @@ from spikecam_env.gap.unit.conversion import LINES
 from spikecam_env.gap.unit.indirect_inference import extrapolated_unit
 from spikecam_env.gap.unit.refit import BaseFit, constrained_refit
 from spikecam_env.sensor import SensorModel
-
-Array = NDArray[np.float64]
 
 
 def confirmed(problem: Problem, found: Fit, count: int | None = None) -> Fit:

@@ -11,7 +11,6 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from spikecam_env.gap.candidates.strength import bounded, with_effect
 from spikecam_env.gap.candidates.table import candidate
@@ -23,8 +22,7 @@ from spikecam_env.gap.fit.problem import Problem
 from spikecam_env.gap.unit.indirect_inference import has_converged
 from spikecam_env.gap.unit.refit import BaseFit, constrained_refit
 from spikecam_env.sensor import SensorModel
-
-Array = NDArray[np.float64]
+from spikecam_env.types import Floats
 
 PROBES = 2
 """Times that a model is probed: under the unit there was, and under the one that it then shows."""
@@ -54,9 +52,9 @@ class Descent:
     model: SensorModel
     base: BaseFit
     prediction: Prediction
-    columns: Array
-    noise: Array
-    covariance: Array
+    columns: Floats
+    noise: Floats
+    covariance: Floats
 
 
 def descend(
@@ -98,7 +96,7 @@ def descend(
     return Descent(model, base, replace(at, mean=at.mean + columns @ step), columns, noise, covariance)
 
 
-def broyden(columns: Array, step: Array, change: Array, noise: Array | float = 0.0) -> Array:
+def broyden(columns: Floats, step: Floats, change: Floats, noise: Floats | float = 0.0) -> Floats:
     """(S, n) derivatives that give the change (S,) that a step (n,) turned out to make, where there are any.
 
     noise: (S,) largest surprise that is chance.  As a slope, that of a short step would look like knowledge of the
@@ -108,7 +106,7 @@ def broyden(columns: Array, step: Array, change: Array, noise: Array | float = 0
     return np.asarray(columns + corrected * np.outer(surprise, step) / (step @ step))
 
 
-def moved(model: SensorModel, base: BaseFit, free: Free, step: Array) -> tuple[SensorModel, BaseFit]:
+def moved(model: SensorModel, base: BaseFit, free: Free, step: Floats) -> tuple[SensorModel, BaseFit]:
     """The model and the unit with the coordinates of these parameters moved."""
     for (name, key), s in zip(free, step, strict=True):
         if (name, key) == WHITE:
@@ -121,7 +119,7 @@ def moved(model: SensorModel, base: BaseFit, free: Free, step: Array) -> tuple[S
 
 def derivatives(
     problem: Problem, probe: Probe, model: SensorModel, base: BaseFit, at: Prediction, free: Free
-) -> tuple[Array, Array]:
+) -> tuple[Floats, Floats]:
     """(S, n) change of the statistics for one more of each parameter's logarithm, and its noise; at: what the model
     gives.  Each is taken under a unit that has settled: of one that has not, light that saturates says more than there
     is.  What one parameter of an effect clearly moves says of its others that they do not, or how far."""
@@ -153,7 +151,7 @@ def unit_after(model: SensorModel, base: BaseFit, null: Null, made: Prediction, 
     return replace(there, white=base.white) if WHITE in free else there
 
 
-def prior_sd(free: Free) -> Array:
+def prior_sd(free: Free) -> Floats:
     """(n,) logarithms by which parameters may differ, standard deviations, before anything is measured: a factor of e,
     of a shape twice the step that its derivative takes."""
     fitted = [name != WHITE[0] and key != candidate(name).strength for name, key in free]
@@ -162,7 +160,7 @@ def prior_sd(free: Free) -> Array:
     )
 
 
-def longest_of(free: Free, longest: float) -> Array:
+def longest_of(free: Free, longest: float) -> Floats:
     """(n,) largest step of each logarithm at once: `longest`, and no further than what was open of it before."""
     return np.minimum(prior_sd(free), longest)
 

@@ -6,7 +6,6 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from spikecam_env.gap.candidates.table import Candidates, candidate
 from spikecam_env.gap.compare.prediction import Prediction
@@ -19,8 +18,7 @@ from spikecam_env.gap.fit.problem import Problem
 from spikecam_env.gap.fit.recordings import twins_of, with_held_out
 from spikecam_env.gap.unit.refit import BaseFit, constrained_refit
 from spikecam_env.sensor import SensorModel
-
-Array = NDArray[np.float64]
+from spikecam_env.types import Floats
 
 
 def refined_together(problem: Problem, found: Fit, names: Sequence[str]) -> tuple[Fit, Errors, bool]:
@@ -45,7 +43,7 @@ def refined_together(problem: Problem, found: Fit, names: Sequence[str]) -> tupl
     return replace(whole, misfit=problem.misfit(whole.prediction)), known, True
 
 
-def _refined(problem: Problem, found: Fit, names: Sequence[str]) -> tuple[Fit, Errors, Array]:
+def _refined(problem: Problem, found: Fit, names: Sequence[str]) -> tuple[Fit, Errors, Floats]:
     """The fit, its errors, and (S,) by what variance statistics are unknown for them (`last_step`).
 
     Of what is not refined (`to_refine`), as of the others, derivatives are then taken anew for the last step."""
@@ -65,7 +63,7 @@ def _refined(problem: Problem, found: Fit, names: Sequence[str]) -> tuple[Fit, E
     return with_last_step(problem, best, names, slopes)
 
 
-def with_last_step(problem: Problem, found: Fit, names: Sequence[str], slopes: Slopes) -> tuple[Fit, Errors, Array]:
+def with_last_step(problem: Problem, found: Fit, names: Sequence[str], slopes: Slopes) -> tuple[Fit, Errors, Floats]:
     """`last_step`, with the parameters and errors of the fit's own effect; these are no smaller than before where not
     all of them are free."""
     best, errors, own2 = last_step(problem, found, names, slopes)

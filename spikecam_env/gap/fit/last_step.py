@@ -14,7 +14,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from spikecam_env.gap.candidates.table import candidate
 from spikecam_env.gap.compare.step import step_of
@@ -31,8 +30,7 @@ from spikecam_env.gap.fit.gauss_newton import (
     prior_sd,
 )
 from spikecam_env.gap.fit.problem import Problem
-
-Array = NDArray[np.float64]
+from spikecam_env.types import Floats
 
 MOST_LINEAR_STEPS = 20
 """Steps to a linear minimum at most; they cost no twin."""
@@ -50,15 +48,15 @@ class Slopes:
 
     free: tuple[tuple[str, str], ...]
     """The n parameters, by effect and name."""
-    columns: Array
+    columns: Floats
     """(S, n) change of each statistic for one more of each logarithm."""
-    noise: Array
+    noise: Floats
     """(S, n) standard deviations of `columns`."""
     once: bool
     """Whether derivatives were taken once, at the fit, since not all parameters were descended."""
 
     @classmethod
-    def of_descent(cls, free: Free, columns: Array, noise: Array) -> Slopes:
+    def of_descent(cls, free: Free, columns: Floats, noise: Floats) -> Slopes:
         """Those at the end of a descent."""
         return cls(tuple(free), columns, noise, once=False)
 
@@ -73,7 +71,7 @@ class Slopes:
         return cls(tuple(free), columns, noise, once=True)
 
 
-def last_step(problem: Problem, found: Fit, names: Sequence[str], slopes: Slopes) -> tuple[Fit, Errors, Array]:
+def last_step(problem: Problem, found: Fit, names: Sequence[str], slopes: Slopes) -> tuple[Fit, Errors, Floats]:
     """Move a fit by the step that its own twins ask for.
 
     Args:
@@ -106,7 +104,7 @@ def last_step(problem: Problem, found: Fit, names: Sequence[str], slopes: Slopes
     return best, errors, np.einsum("sn,nm,sm->s", slopes.columns, spread, slopes.columns)
 
 
-def linear_minimum(problem: Problem, found: Fit, slopes: Slopes, before: Array) -> Array:
+def linear_minimum(problem: Problem, found: Fit, slopes: Slopes, before: Floats) -> Floats:
     """(n,) step to the minimum of the misfit, if the statistics were linear: what holds back a single step of
     `step_of`, its damping and its robust weights, is no error of the parameters.  before: (n,) as of `step_of`."""
     total = np.zeros(len(slopes.free))
@@ -119,13 +117,13 @@ def linear_minimum(problem: Problem, found: Fit, slopes: Slopes, before: Array) 
     return total
 
 
-def curvature_of_step(free: Free, taken: Array) -> Array:
+def curvature_of_step(free: Free, taken: Floats) -> Floats:
     """(n,) error of logarithms after one step (n,), which another one would remove: it is linear, and laws are not."""
     powers = [1.0 if f == WHITE or f[1] != candidate(f[0]).strength else candidate(f[0]).power for f in free]
     return np.array(powers) * taken**2 / 2
 
 
-def _stepped(problem: Problem, best: Fit, slopes: Slopes, step: Array) -> tuple[Fit, Array]:
+def _stepped(problem: Problem, best: Fit, slopes: Slopes, step: Floats) -> tuple[Fit, Floats]:
     """(the fit moved, (n,) the step taken): none that leaves more.  After a descent none longer than one of a descent;
     without, as far as that goes.  What one twin happened to scatter is in the parameters that it led to."""
     longest = longest_of(slopes.free, problem.settings.fitting.longest_step)

@@ -6,7 +6,6 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from spikecam_env.gap.compare.prediction import Draw, Null, Prediction, paired, values_of, with_pattern_moved
 from spikecam_env.gap.twins.case import Case, twins
@@ -16,8 +15,6 @@ from spikecam_env.gap.unit.indirect_inference import inferred_unit
 from spikecam_env.gap.unit.refit import BaseFit
 from spikecam_env.gap.unit.traps import traps_of
 from spikecam_env.sensor import SensorModel
-
-Array = NDArray[np.float64]
 
 
 def predict_by_twins(

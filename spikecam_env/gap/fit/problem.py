@@ -6,7 +6,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from spikecam_env.gap.compare.distance import freedom_of, is_significant, residual, residual_and_misfit
 from spikecam_env.gap.compare.prediction import Null, Prediction, law_error, own_variance
@@ -16,8 +15,7 @@ from spikecam_env.gap.settings import DiagnosisSettings
 from spikecam_env.gap.twins.case import Case
 from spikecam_env.gap.unit.refit import BaseFit
 from spikecam_env.sensor import SensorModel
-
-Array = NDArray[np.float64]
+from spikecam_env.types import Floats
 
 
 @dataclass(frozen=True, eq=False)
@@ -31,11 +29,11 @@ class Problem:
     case: Case
     model: SensorModel
     null: Null
-    seen: Array
-    values: Array
+    seen: Floats
+    values: Floats
 
     @staticmethod
-    def of(case: Case, model: SensorModel, null: Null, values: Array) -> Problem:
+    def of(case: Case, model: SensorModel, null: Null, values: Floats) -> Problem:
         """With the recordings to fit that the case says."""
         return Problem(case, model, null, values_to_fit(case, null, values), values)
 
@@ -53,7 +51,7 @@ class Problem:
         """What is left to explain of a model with effects already added, its unit and what it predicts."""
         return replace(self, case=replace(self.case, base=base), model=model, null=standing_on(self.null, predicted))
 
-    def residual_and_misfit(self, predicted: Prediction) -> tuple[Array, float]:
+    def residual_and_misfit(self, predicted: Prediction) -> tuple[Floats, float]:
         """((S,) residual, misfit) of a prediction, by the recordings to fit."""
         return residual_and_misfit(self.null, self.seen, predicted)
 
@@ -77,7 +75,7 @@ class Problem:
         """The unit under another model (`predict.settled_unit`)."""
         return settled_unit(model, base, self.null, predicted)
 
-    def affected(self, names: Sequence[str], change: Array | None = None) -> list[int]:
+    def affected(self, names: Sequence[str], change: Floats | None = None) -> list[int]:
         """Recordings that effects concern, by index (`recordings_affected`).  change: (S,) of the statistics; where
         None it may be everywhere."""
         everywhere = np.full(len(self.null.keys), np.inf)
@@ -89,7 +87,7 @@ class Problem:
         return self.case.budget.allows(what, recordings, needed=needed)
 
 
-def values_to_fit(case: Case, null: Null, values: Array) -> Array:
+def values_to_fit(case: Case, null: Null, values: Floats) -> Floats:
     """(S,) values of recordings of use fit; NaN for the held-out ones, which take no part in the search."""
     return np.where(case.to_fit(null.keys), values, np.nan)
 

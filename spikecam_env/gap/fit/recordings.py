@@ -5,14 +5,12 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
 from spikecam_env.gap.candidates.table import Candidates, candidate
 from spikecam_env.gap.compare.prediction import Null
 from spikecam_env.gap.settings import Twins
 from spikecam_env.gap.twins.case import Case, refit_recordings
-
-Array = NDArray[np.float64]
+from spikecam_env.types import Floats
 
 
 def twins_of(name: str, settings: Twins) -> int:
@@ -22,7 +20,7 @@ def twins_of(name: str, settings: Twins) -> int:
     return settings.of_events if what.events or what.few_pixels or what.mixed else 1
 
 
-def recordings_affected(case: Case, names: Sequence[str], null: Null, measured: Array, effect: Array) -> list[int]:
+def recordings_affected(case: Case, names: Sequence[str], null: Null, measured: Floats, effect: Floats) -> list[int]:
     """Recordings of use fit on which effects show, or something has to be explained, by index; all where none does.
 
     With those that the refit rests on: the refit takes up the effects' mean, and the others are judged by that refit.

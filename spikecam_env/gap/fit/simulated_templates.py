@@ -13,7 +13,6 @@ from functools import partial
 from itertools import product
 
 import numpy as np
-from numpy.typing import NDArray
 
 from spikecam_env.gap.baseline.null_model import unit_under
 from spikecam_env.gap.candidates.strength import bounded, with_effect
@@ -27,8 +26,7 @@ from spikecam_env.gap.twins.case import Case, twins
 from spikecam_env.gap.twins.simulate import simulate
 from spikecam_env.gap.unit.refit import constrained_refit
 from spikecam_env.sensor import CATALOGUE, SensorModel
-
-Array = NDArray[np.float64]
+from spikecam_env.types import Floats
 
 REFITTED = 3
 """Twins that say what a model without the effect gives, refitted to a severe one."""
@@ -102,7 +100,7 @@ def severe_template(
     return Template(name, dict(parameters), np.where(of_pattern, 0.0, shift), times, white)
 
 
-def simulated_shift(case: Case, model: SensorModel, null: Null, name: str, parameters: Mapping[str, float]) -> Array:
+def simulated_shift(case: Case, model: SensorModel, null: Null, name: str, parameters: Mapping[str, float]) -> Floats:
     """(S,) change of the statistics, in noise, that a candidate makes: by units drawn, or by a twin of the unit that
     indirect inference gives: else a refit would take up a bend of the rates, and saturation show a unit too bright."""
     there = with_effect(model, name, parameters)

@@ -12,10 +12,9 @@ from spikecam_env.campaign.reading import Campaign
 from spikecam_env.errors import InputError
 from spikecam_env.gap.observe.conditions import STEADY_KNOWN, Condition, condition_of
 from spikecam_env.gap.settings import DiagnosisSettings
-from spikecam_env.gap.statistics import Key, pattern, texture
+from spikecam_env.gap.statistics import StatisticKey, pattern, texture
 from spikecam_env.sensor import SensorModel
-
-Array = NDArray[np.float64]
+from spikecam_env.types import Floats
 
 
 @dataclass(frozen=True)
@@ -23,7 +22,7 @@ class RateMap:
     """One recording of rates.  rate: (H, W) [spikes/frame], spread within a count."""
 
     shown: Condition
-    rate: Array
+    rate: Floats
 
 
 @dataclass(frozen=True)
@@ -41,7 +40,7 @@ class MapCase:
     settings: DiagnosisSettings = field(default_factory=DiagnosisSettings)
 
     @property
-    def statistics(self) -> dict[Key, float]:
+    def statistics(self) -> dict[StatisticKey, float]:
         """Statistics of the measured maps."""
         return map_bank(self.maps)
 
@@ -63,17 +62,17 @@ def read_maps(campaign: Campaign, seed: int, jobs: int, settings: DiagnosisSetti
     return MapCase(campaign.shape, tuple(maps), response, level, seed, jobs, settings)
 
 
-def spread_evenly(rate: Array, frames: int) -> Array:
+def spread_evenly(rate: Floats, frames: int) -> Floats:
     """Rates spread within a count: of ten spikes a pixel in the dark, quantiles else say which whole number it is."""
     return rate + (np.random.default_rng(frames).random(rate.shape) - 0.5) / frames
 
 
-def dark_of(maps: Sequence[RateMap]) -> Array | None:
+def dark_of(maps: Sequence[RateMap]) -> Floats | None:
     dark = [m.rate for m in maps if m.shown.kind == "dark"]
     return np.mean(dark, axis=0) if dark else None
 
 
-def map_bank(maps: Sequence[RateMap]) -> dict[Key, float]:
+def map_bank(maps: Sequence[RateMap]) -> dict[StatisticKey, float]:
     """Statistics of every map; texture of lit ones less the dark."""
     dark = dark_of(maps)
     found = {}
@@ -81,7 +80,7 @@ def map_bank(maps: Sequence[RateMap]) -> dict[Key, float]:
         own = m.rate if m.shown.kind == "dark" or dark is None else m.rate - dark
         for group, values in (("pattern", pattern.statistics(m.rate)), ("texture", texture.statistics(own))):
             for name, value in values.items():
-                found[Key(group, m.shown.name, name)] = value
+                found[StatisticKey(group, m.shown.name, name)] = value
     return found
 
 
@@ -99,7 +98,7 @@ def unit_maps(model: SensorModel, case: MapCase, number: int) -> tuple[RateMap, 
     return tuple(made)
 
 
-def unit_levels(model: SensorModel, case: MapCase, number: int) -> tuple[Array, Array]:
+def unit_levels(model: SensorModel, case: MapCase, number: int) -> tuple[Floats, Floats]:
     """(H, W) response over its median, and dark level [spikes/frame], of a fresh unit."""
     unit = model.draw_unit(case.shape, case.seed + number)
     gain = unit.gain / max(float(np.median(unit.gain)), 1e-12)
@@ -108,7 +107,7 @@ def unit_levels(model: SensorModel, case: MapCase, number: int) -> tuple[Array, 
     return gain.reshape(case.shape), dark.reshape(case.shape)
 
 
-def with_use(case: MapCase, keys: Sequence[Key], use: str) -> NDArray[np.bool_]:
+def with_use(case: MapCase, keys: Sequence[StatisticKey], use: str) -> NDArray[np.bool_]:
     """(S,) which statistics are of recordings of this use."""
     names = {m.shown.name for m in case.maps if m.shown.use == use}
     return np.array([k.recording in names for k in keys])

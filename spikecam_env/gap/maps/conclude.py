@@ -8,7 +8,6 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from spikecam_env.gap.candidates.table import candidate
 from spikecam_env.gap.compare.distance import adjusted, deviates, is_significant, residual
@@ -34,8 +33,7 @@ from spikecam_env.gap.result import (
 )
 from spikecam_env.gap.unit.usual import unusual
 from spikecam_env.sensor import CATALOGUE, SensorModel
-
-Array = NDArray[np.float64]
+from spikecam_env.types import Floats
 
 MOST_RELATIVE_SD = 10.0
 """Standard deviation of a parameter's logarithm from which no error is stated: of an effect that does nothing."""
@@ -48,7 +46,7 @@ def conclude_maps(
     case: MapCase,
     tested: SensorModel,
     null: Null,
-    values: Array,
+    values: Floats,
     rounds: Sequence[Sequence[MapFit]],
     rejected: Sequence[MapFit],
     not_testable: Sequence[tuple[str, str]],
@@ -95,7 +93,7 @@ def conclude_maps(
 
 
 def significant_effects(
-    case: MapCase, null: Null, values: Array, rounds: Sequence[Sequence[MapFit]]
+    case: MapCase, null: Null, values: Floats, rounds: Sequence[Sequence[MapFit]]
 ) -> tuple[NamedEffect, ...]:
     """The best of each round after the first, where its strength is significant in the end."""
     found = []
@@ -106,7 +104,7 @@ def significant_effects(
     return tuple(found)
 
 
-def map_statistics(case: MapCase, null: Null, values: Array, predicted: Array, rho: Array) -> tuple[Statistic, ...]:
+def map_statistics(case: MapCase, null: Null, values: Floats, predicted: Floats, rho: Floats) -> tuple[Statistic, ...]:
     """Every statistic, measured, before and after; rho: (S,) what is left, in noise."""
     use, z = with_use(case, null.keys, "fit"), deviates(null, values)
     p = adjusted(z)
@@ -189,13 +187,13 @@ def ranked_fit(t: MapFit, before: float, best: str, accepted: bool, accept: floa
     return Ranked(t.name, candidate(t.name).family, before, t.misfit, fit_estimates(t, t.name), accepted, reason)
 
 
-def worst_left(null: Null, rho: Array) -> list[str]:
+def worst_left(null: Null, rho: Floats) -> list[str]:
     """The statistics with the largest deviates."""
     order = sorted(range(len(rho)), key=lambda j: -abs(rho[j]))[:LISTED]
     return [f"{null.keys[j].recording} {null.keys[j].name} ({rho[j]:+.1f})" for j in order]
 
 
-def note_on_what_is_left(null: Null, rho: Array, left: float) -> str:
+def note_on_what_is_left(null: Null, rho: Floats, left: float) -> str:
     """A note on a name that does not explain everything."""
     return (
         f"the named effects leave {100 * left:.1f} % of the mean square distance, more than chance; "
@@ -203,7 +201,7 @@ def note_on_what_is_left(null: Null, rho: Array, left: float) -> str:
     )
 
 
-def maps_structure(null: Null, rho: Array, left: float, found: list[str]) -> dict[str, Any]:
+def maps_structure(null: Null, rho: Floats, left: float, found: list[str]) -> dict[str, Any]:
     """The structure of the difference that remains beside all effects that help."""
     return {
         "light": "rates alone: in the dark and in the light",
@@ -214,7 +212,7 @@ def maps_structure(null: Null, rho: Array, left: float, found: list[str]) -> dic
     }
 
 
-def gap_of_maps(case: MapCase, null: Null, values: Array, predicted: Array) -> Gap:
+def gap_of_maps(case: MapCase, null: Null, values: Floats, predicted: Floats) -> Gap:
     """Mean squares in the null's noise: a fitted model of maps scatters as the null does."""
     b, a = (((values - mean) / null.noise) ** 2 for mean in (null.mean, predicted))
     by_recording = {}

@@ -3,15 +3,13 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from spikecam_env.gap.maps.bank import MapCase, dark_of, unit_levels
 from spikecam_env.gap.maps.search import MapFit, PatternModel
 from spikecam_env.gap.result import Evidence
 from spikecam_env.gap.unit.refit import BaseFit
 from spikecam_env.sensor import SensorModel
-
-Array = NDArray[np.float64]
+from spikecam_env.types import Floats
 
 
 def evidence_of_maps(case: MapCase, given: PatternModel, last: MapFit | None) -> Evidence:
@@ -22,11 +20,11 @@ def evidence_of_maps(case: MapCase, given: PatternModel, last: MapFit | None) ->
     dark = zero if dark is None else dark
     gain = (lit[0].rate - dark) / max(case.response[lit[0].shown.name], 1e-12) if lit else zero
 
-    def base(gain: Array, dark: Array) -> BaseFit:
+    def base(gain: Floats, dark: Floats) -> BaseFit:
         flat = np.zeros(gain.size)
         return BaseFit(gain.ravel(), dark.ravel(), flat, flat, 0.0, np.zeros((0, gain.size)), flat == 0)
 
-    def levels(model: SensorModel) -> tuple[Array, Array]:
+    def levels(model: SensorModel) -> tuple[Floats, Floats]:
         fresh, level = unit_levels(model, case, case.settings.maps.units)
         return fresh.ravel(), level.ravel()
 

@@ -19,11 +19,10 @@ from spikecam_env.gap.candidates.table import candidate
 from spikecam_env.gap.compare.distance import is_significant, residual, robust_squares
 from spikecam_env.gap.compare.prediction import Null, Prediction, values_of
 from spikecam_env.gap.maps.bank import MapCase, map_bank, unit_maps, with_use
-from spikecam_env.gap.statistics import Key
+from spikecam_env.gap.statistics import StatisticKey
 from spikecam_env.gap.twins.fresh_units import SPREAD_PARAMETERS as UNIT_SPREADS
 from spikecam_env.sensor import CATALOGUE, SensorModel
-
-Array = NDArray[np.float64]
+from spikecam_env.types import Floats
 
 FITTED_SPREADS = {"response": UNIT_SPREADS["gain"], "dark": UNIT_SPREADS["dark"]}
 """What is scaled to fit how pixels differ: parameters of effects, by what they spread."""
@@ -65,30 +64,30 @@ class MapFit:
     name: str
     state: PatternModel
     sd: dict[str, float]
-    predicted: Array
-    rho: Array
+    predicted: Floats
+    rho: Floats
     misfit: float
 
 
-def mean_prediction(null: Null, mean: Array, units: int) -> Prediction:
+def mean_prediction(null: Null, mean: Floats, units: int) -> Prediction:
     """A mean over that many units."""
     return Prediction(mean, null.sd / np.sqrt(units), null.sd)
 
 
-def unit_means(state: PatternModel, case: MapCase, keys: Sequence[Key], units: Sequence[int]) -> Array:
+def unit_means(state: PatternModel, case: MapCase, keys: Sequence[StatisticKey], units: Sequence[int]) -> Floats:
     """(S,) mean statistics over units."""
-    mean: Array = np.mean([values_of(map_bank(unit_maps(state.fitted, case, n)), keys) for n in units], axis=0)
+    mean: Floats = np.mean([values_of(map_bank(unit_maps(state.fitted, case, n)), keys) for n in units], axis=0)
     return mean
 
 
-def spreads_matched(state: PatternModel, case: MapCase, measured: dict[Key, float]) -> PatternModel:
+def spreads_matched(state: PatternModel, case: MapCase, measured: dict[StatisticKey, float]) -> PatternModel:
     """Spreads moved towards the measured width of each kind of map, as far as units differ."""
     for _ in range(2):
         simulated = map_bank(unit_maps(state.fitted, case, 0))
         factors = dict(state.factors)
         for what, kinds in (("response", ("flat", "picture")), ("dark", ("dark",))):
             keys = [
-                Key("texture", m.shown.name, "fine")
+                StatisticKey("texture", m.shown.name, "fine")
                 for m in case.maps
                 if m.shown.kind in kinds and m.shown.use == "fit"
             ]
@@ -102,7 +101,7 @@ def spreads_matched(state: PatternModel, case: MapCase, measured: dict[Key, floa
 
 
 def search_maps(
-    case: MapCase, given: PatternModel, null: Null, values: Array, names: Sequence[str]
+    case: MapCase, given: PatternModel, null: Null, values: Floats, names: Sequence[str]
 ) -> tuple[list[list[MapFit]], list[MapFit]]:
     """(rounds, rejected): the spreads alone; then, each round, candidates, the one that leaves least first; and what
     was tried last and did not help."""
@@ -122,7 +121,7 @@ def search_maps(
     return rounds, []
 
 
-def fit_candidate(case: MapCase, start: PatternModel, null: Null, values: Array, name: str) -> MapFit:
+def fit_candidate(case: MapCase, start: PatternModel, null: Null, values: Floats, name: str) -> MapFit:
     """A candidate's parameters, all that were added before, and the spreads, together."""
     state = start
     if name:
@@ -177,8 +176,8 @@ def _moved(state: PatternModel, what: tuple[str, str], step: float) -> PatternMo
 
 
 def _step(
-    null: Null, values: Array, predicted: Array, jacobian: Array, use: NDArray[np.bool_], damping: float
-) -> tuple[Array, Array]:
+    null: Null, values: Floats, predicted: Floats, jacobian: Floats, use: NDArray[np.bool_], damping: float
+) -> tuple[Floats, Floats]:
     """Damped Gauss-Newton step under the heavy-tailed loss, and the covariance of parameters."""
     rho = residual(null, values, mean_prediction(null, predicted, 1))
     gap = np.nan_to_num(values - predicted)

@@ -15,7 +15,7 @@ from tqdm import tqdm
 
 from spikecam_env.campaign.reading import Campaign, CampaignRecording
 from spikecam_env.gap.acquisition.recording_kinds import Planned
-from spikecam_env.gap.observe.observation import Observation, observe
+from spikecam_env.gap.observe.observation import ObservedRecording, observe
 from spikecam_env.sensor import Keyframes
 
 STEADY_KNOWN = ("dark", "flat", "picture")
@@ -87,7 +87,9 @@ def _condition(name: str, light: Keyframes, frames: int, use: str, v_d: float | 
     return Condition(name, kind, level, light, frames, use, v_d)
 
 
-def observe_all(campaign: Campaign, conditions: list[Condition], *, progress: bool = False) -> list[Observation | None]:
+def observe_all(
+    campaign: Campaign, conditions: list[Condition], *, progress: bool = False
+) -> list[ObservedRecording | None]:
     """Every recording of spikes in numbers; None for those that are rates only."""
     bar = tqdm(zip(campaign.recordings, conditions, strict=True), "read", len(conditions), disable=not progress)
     return [observe(r.packed(), campaign.shape, film=c.moves, static=c.static) if r.spikes else None for r, c in bar]

@@ -15,8 +15,7 @@ from spikecam_env.calibration.spike_times import SpikeTimes
 from spikecam_env.gap.observe.bit_passes import add_rows, through_frames, through_pixels
 from spikecam_env.streams.bits import as_words
 from spikecam_env.streams.packing import pack_frames, unpack_frames
-
-Array = NDArray[np.float64]
+from spikecam_env.types import Floats
 
 DIFFERENCES = (1, 4, 16, 64)
 """k of the second differences A_k [intervals]: noise of single spikes at 1, slow noise at 64."""
@@ -38,7 +37,7 @@ FRAME_LAGS = 3
 
 
 @dataclass(frozen=True)
-class Observation:
+class ObservedRecording:
     """One recording in numbers; P pixels row-major, F frames, shape (H, W).
 
     times: ends, counts and A_k of each pixel.  variance, covariance: (P,) of intervals, and of successive ones, about
@@ -56,8 +55,8 @@ class Observation:
 
     shape: tuple[int, int]
     times: SpikeTimes
-    variance: Array
-    covariance: Array
+    variance: Floats
+    covariance: Floats
     short: NDArray[np.int64]
     long: NDArray[np.int64]
     lengths: NDArray[np.int64]
@@ -65,10 +64,10 @@ class Observation:
     frame: NDArray[np.int32]
     row: NDArray[np.int32]
     column: NDArray[np.int32]
-    coincidences: Array
+    coincidences: Floats
     film: NDArray[np.uint8] | None
-    late: Array
-    scatter: Array
+    late: Floats
+    scatter: Floats
     timed: NDArray[np.int32]
     odd: NDArray[np.int32]
     flips: NDArray[np.int32]
@@ -78,7 +77,7 @@ class Observation:
         return self.times.frames
 
     @property
-    def rate(self) -> Array:
+    def rate(self) -> Floats:
         """(P,) spikes a frame between first and last spike; count over frames below two spikes."""
         return np.where(self.times.count > 1, self.times.rate, self.times.count / self.frames)
 
@@ -95,7 +94,7 @@ def observe(
     *,
     film: bool = False,
     static: NDArray[np.bool_] | None = None,
-) -> Observation:
+) -> ObservedRecording:
     """Reduce (F, ceil(H W / 8)) uint8 bits; film: keep counts in bins of time.
 
     static: (H, W), the pixels to look at; all others count as silent.
@@ -120,7 +119,7 @@ def observe(
     coincidences = np.zeros((FRAME_LAGS, 2))
     through_frames(by_row, shape[0], row, coincidences)
     count, first, last = ends.T
-    return Observation(
+    return ObservedRecording(
         shape,
         SpikeTimes(len(packed), count, first, last, np.array(DIFFERENCES), square, terms),
         moments[:, 0],

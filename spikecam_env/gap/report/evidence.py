@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 
-from spikecam_env.gap.observe.observation import Observation
+from spikecam_env.gap.observe.observation import ObservedRecording
 from spikecam_env.gap.result import LABELLED_LIGHT, NOMINAL_LIGHT, Conclusion, Evidence
 from spikecam_env.gap.search.round import Round
 from spikecam_env.gap.twins.case import Case
@@ -35,7 +35,7 @@ def evidence_of(
     """
     counted_anew = case.nominal_per_label != 1.0
 
-    def twin(model: SensorModel, unit: BaseFit, number: int) -> tuple[Observation, ...]:
+    def twin(model: SensorModel, unit: BaseFit, number: int) -> tuple[ObservedRecording, ...]:
         seed, takes = case.seed * 1000 + 900 + number, range(len(case.conditions))
         return tuple(simulate_seen(model, unit, case.conditions, case.observations, case.shape, seed, takes, case.jobs))
 

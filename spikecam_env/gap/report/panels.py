@@ -19,14 +19,14 @@ import scipy
 from numpy.typing import NDArray
 
 from spikecam_env.gap.observe.conditions import Condition
-from spikecam_env.gap.observe.observation import Observation
+from spikecam_env.gap.observe.observation import ObservedRecording
 from spikecam_env.gap.result import Evidence
 
 Array = NDArray[np.floating[Any]]
 
 
 @dataclass(frozen=True)
-class Panel:
+class PlotPanel:
     """One plot.  x, measured, before, sd (N,); after (N,) or None.  log: axes that are logarithmic, "", "x", "y", "xy".
 
     xlabel, ylabel: with the unit in brackets, [1] of pure numbers.
@@ -66,14 +66,14 @@ class PixelMaps:
     after: Array | None
 
 
-class Take(NamedTuple):
+class ReportedRecording(NamedTuple):
     """One recording: its conditions, and what was observed."""
 
     shown: Condition
-    measured: Observation
-    before: Observation
-    after: Observation | None
-    again: Observation | None
+    measured: ObservedRecording
+    before: ObservedRecording
+    after: ObservedRecording | None
+    again: ObservedRecording | None
 
 
 def shape_of(evidence: Evidence) -> tuple[int, int] | None:
@@ -84,15 +84,19 @@ def shape_of(evidence: Evidence) -> tuple[int, int] | None:
     return (rows, columns) if rows else None
 
 
-def takes(evidence: Evidence, kinds: Sequence[str]) -> list[Take]:
+def takes(evidence: Evidence, kinds: Sequence[str]) -> list[ReportedRecording]:
     """Recordings of spikes in these kinds of light, in order."""
     nothing = (None,) * len(evidence.conditions)
     after, again = evidence.after or nothing, evidence.again or nothing
     rows = zip(evidence.conditions, evidence.measured, evidence.before, after, again, strict=True)
-    return [Take(*row) for row in rows if row[0].kind in kinds and row[1] is not None and row[2] is not None]
+    return [
+        ReportedRecording(*row) for row in rows if row[0].kind in kinds and row[1] is not None and row[2] is not None
+    ]
 
 
-def over_pixels(take: Take, of: Callable[[Observation], Array]) -> tuple[Array, Array, Array | None, Array]:
+def over_pixels(
+    take: ReportedRecording, of: Callable[[ObservedRecording], Array]
+) -> tuple[Array, Array, Array | None, Array]:
     """Means over the last axis: measured, before, after, and the standard error of measured less before."""
     measured, before = of(take.measured), of(take.before)
     known = np.isfinite(measured) & np.isfinite(before)
@@ -119,7 +123,7 @@ def error_known(values: Array, known: NDArray[np.bool_]) -> Array:
     return error
 
 
-def largest(panels: Sequence[Panel], number: int) -> list[Panel]:
+def largest(panels: Sequence[PlotPanel], number: int) -> list[PlotPanel]:
     """The panels where measured and before differ most, in the order given."""
     kept = sorted(panels, key=lambda p: -p.z)[:number]
     return [p for p in panels if p in kept]
@@ -140,7 +144,9 @@ def scaled_by_twins(sd: Array, difference: Array | None) -> Array:
     return scaled
 
 
-def by_recording(found: Sequence[Take], of: Callable[[Observation], Array]) -> tuple[Array, Array, Array | None, Array]:
+def by_recording(
+    found: Sequence[ReportedRecording], of: Callable[[ObservedRecording], Array]
+) -> tuple[Array, Array, Array | None, Array]:
     rows = [over_pixels(t, of) for t in found]
     after = [r[2] for r in rows]
     return (
@@ -152,15 +158,21 @@ def by_recording(found: Sequence[Take], of: Callable[[Observation], Array]) -> t
 
 
 def against_before(
-    title: str, ylabel: str, found: Sequence[Take], measured: Array, before: Array, after: Array | None, sd: Array,
+    title: str,
+    ylabel: str,
+    found: Sequence[ReportedRecording],
+    measured: Array,
+    before: Array,
+    after: Array | None,
+    sd: Array,
     scale: Array,
-) -> Panel:  # fmt: skip
+) -> PlotPanel:
     """A quantity of each recording less the model's, times `scale`."""
-    return Panel(
+    return PlotPanel(
         title, "", ylabel, np.arange(len(found), dtype=np.float64), scale * (measured - before), np.zeros(len(found)),
         None if after is None else scale * (after - before), scale * sd, labels=names(found),
     )  # fmt: skip
 
 
-def names(found: Sequence[Take]) -> tuple[str, ...]:
+def names(found: Sequence[ReportedRecording]) -> tuple[str, ...]:
     return tuple(t.shown.name for t in found)

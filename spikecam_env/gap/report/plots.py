@@ -16,7 +16,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from spikecam_env.gap.report.panels import Array, Panel
+from spikecam_env.gap.report.panels import Array, PlotPanel
 from spikecam_env.gap.report.quantities import three_digits
 from spikecam_env.gap.result import Gap, Statistic
 
@@ -34,7 +34,7 @@ _TICKS_OF_LONG_NUMBERS = 5
 _plain = mpl.ticker.FuncFormatter(lambda value, _: f"{value:g}")
 
 
-def panel(p: Panel) -> Figure:
+def panel(p: PlotPanel) -> Figure:
     """Measured, before and after, with a band of two standard errors around before."""
     with mpl.rc_context(_FONTS):
         figure, axis = _plot(_height(len(p.labels)), p.labels)
@@ -59,7 +59,7 @@ def _height(names: int) -> float:
     return max(_HEIGHT, 1.1 + 0.26 * names)
 
 
-def _over_x(axis: Axes, p: Panel) -> None:
+def _over_x(axis: Axes, p: PlotPanel) -> None:
     low, high = _band(p)
     many = p.x.size > _MANY
     axis.fill_between(p.x, low, high, color=BAND, lw=0, zorder=0)
@@ -81,14 +81,14 @@ def _over_x(axis: Axes, p: Panel) -> None:
         axis.xaxis.set_major_locator(mpl.ticker.MaxNLocator(8, integer=True))
 
 
-def _band(p: Panel) -> tuple[Array, Array]:
+def _band(p: PlotPanel) -> tuple[Array, Array]:
     """Two standard errors around before; of its logarithm where y is logarithmic."""
     if "y" in p.log:
         return p.before * np.exp(-2 * p.sd / p.before), p.before * np.exp(2 * p.sd / p.before)
     return p.before - 2 * p.sd, p.before + 2 * p.sd
 
 
-def _by_name(axis: Axes, p: Panel) -> None:
+def _by_name(axis: Axes, p: PlotPanel) -> None:
     """Names down the left, values across."""
     y = -p.x
     axis.barh(y, 4 * p.sd, left=p.before - 2 * p.sd, height=0.8, color=BAND, zorder=0)

@@ -19,10 +19,9 @@ from spikecam_env.gap.compare.prediction import Null, pair_noise_share, pooled
 from spikecam_env.gap.compare.step import scale_of
 from spikecam_env.gap.observe.conditions import Condition
 from spikecam_env.gap.screen.templates import Template, Templates
-from spikecam_env.gap.statistics import Key
+from spikecam_env.gap.statistics import StatisticKey
 from spikecam_env.sensor import CATALOGUE
-
-Array = NDArray[np.float64]
+from spikecam_env.types import Floats
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,7 +39,7 @@ class Screened:
     name: str
     start: dict[str, float]
     misfit: float
-    expected: Array
+    expected: Floats
     white: float = 1.0
 
 
@@ -48,7 +47,7 @@ def screen(
     templates: Templates,
     conditions: Sequence[Condition],
     null: Null,
-    measured: Array,
+    measured: Floats,
     names: Sequence[str],
     line_hz: float | None = None,
 ) -> list[Screened]:
@@ -88,7 +87,7 @@ def screen(
     return sorted(best.values(), key=lambda s: s.misfit)
 
 
-def _in_proportion(entry: Template, null: Null, d: Array, shift: Array) -> Screened | None:
+def _in_proportion(entry: Template, null: Null, d: Floats, shift: Floats) -> Screened | None:
     """A template scaled to the measured distances `d`, in noise; None where only a wrong sign would do."""
     own2 = pair_noise_share(null.keys) ** 2 * (shift != 0)
     judging = replace(null.settings.judging, tolerance=2 * null.settings.judging.tolerance)
@@ -103,7 +102,7 @@ def _in_proportion(entry: Template, null: Null, d: Array, shift: Array) -> Scree
     return Screened(entry.name, start, loss(null, rho), scale * shift * null.noise, white)
 
 
-def _scattered(entry: Template, null: Null, d: Array, shift: Array) -> Screened:
+def _scattered(entry: Template, null: Null, d: Floats, shift: Floats) -> Screened:
     """A template of an effect that makes statistics scatter: its size, over all recordings, is the scatter's."""
     strength, power = CATALOGUE[entry.name].strength, candidate(entry.name).power
     size2 = pooled(null.keys, shift**2)
@@ -117,7 +116,7 @@ def _scattered(entry: Template, null: Null, d: Array, shift: Array) -> Screened:
     return Screened(entry.name, start, left, np.sqrt(factor * size2) * null.noise)
 
 
-def _places(templates: Templates, conditions: Sequence[Condition], keys: Sequence[Key]) -> NDArray[np.int64]:
+def _places(templates: Templates, conditions: Sequence[Condition], keys: Sequence[StatisticKey]) -> NDArray[np.int64]:
     """(S,) index of each statistic in the templates, by the recording of its kind whose level is nearest; -1: none."""
     nearest: dict[str, str] = {}
     for c in conditions:
@@ -129,4 +128,4 @@ def _places(templates: Templates, conditions: Sequence[Condition], keys: Sequenc
         byname = [n for n in same if n == c.name]
         nearest[c.name] = (byname or [min(same, key=lambda n: abs(np.log(max(templates.levels[n], 1e-6) / level)))])[0]
     index = {k: i for i, k in enumerate(templates.keys)}
-    return np.array([index.get(Key(k.group, nearest.get(k.recording, ""), k.name), -1) for k in keys])
+    return np.array([index.get(StatisticKey(k.group, nearest.get(k.recording, ""), k.name), -1) for k in keys])

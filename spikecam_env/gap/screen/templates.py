@@ -19,12 +19,11 @@ from numpy.typing import NDArray
 from pydantic import Field
 
 from spikecam_env.errors import InputError
-from spikecam_env.gap.statistics import Key
+from spikecam_env.gap.statistics import StatisticKey
 from spikecam_env.sensor import CATALOGUE
+from spikecam_env.types import Floats
 from spikecam_env.untrusted import Declared, declared, numbers, parse_json, read_arrays
 from spikecam_env.whole import whole_file
-
-Array = NDArray[np.float64]
 
 SEVERE = (8.0, 50.0)
 """Times as strong as the weakest of its shape that a template is of where an effect is severe."""
@@ -41,7 +40,7 @@ class Template:
 
     name: str
     parameters: dict[str, float]
-    shift: Array
+    shift: Floats
     times: float = 1.0
     white: float = 1.0
 
@@ -60,8 +59,8 @@ class Templates:
     name (`sensor/effect_law.py`).
     """
 
-    keys: tuple[Key, ...]
-    noise: Array
+    keys: tuple[StatisticKey, ...]
+    noise: Floats
     levels: dict[str, float]
     kinds: dict[str, str]
     entries: tuple[Template, ...]
@@ -84,7 +83,7 @@ class Templates:
         entries = sorted([*kept, *new], key=lambda e: order.get(e.name, len(order)))
         return replace(self, entries=tuple(entries), laws={**self.laws, **laws})
 
-    def _in_this_noise(self, other: Templates, shift: Array) -> Array:
+    def _in_this_noise(self, other: Templates, shift: Floats) -> Floats:
         if other.keys == self.keys and np.array_equal(other.noise, self.noise):
             return shift
         change = dict(zip(other.keys, shift * other.noise, strict=True))
@@ -125,7 +124,9 @@ def read_templates(path: Path) -> Templates:
     if shifts.shape != (len(about.entries), len(about.keys)) or noise.shape != (len(about.keys),):
         raise InputError(f"{path}: shift {shifts.shape} and noise {noise.shape} do not fit its entries and keys")
     entries = (Template(**dict(e), shift=shift) for e, shift in zip(about.entries, shifts, strict=True))
-    return Templates(tuple(Key(*k) for k in about.keys), noise, about.levels, about.kinds, tuple(entries), about.laws)
+    return Templates(
+        tuple(StatisticKey(*k) for k in about.keys), noise, about.levels, about.kinds, tuple(entries), about.laws
+    )
 
 
 def save_templates(templates: Templates, path: Path) -> None:
@@ -148,5 +149,5 @@ def rounded(templates: Templates) -> Templates:
     return replace(templates, noise=templates.noise.astype(np.float32).astype(np.float64), entries=entries)
 
 
-def _halved(shift: Array) -> NDArray[np.float16]:
+def _halved(shift: Floats) -> NDArray[np.float16]:
     return np.clip(shift, -6e4, 6e4).astype(np.float16)

@@ -12,7 +12,6 @@ from __future__ import annotations
 from collections.abc import Collection
 
 import numpy as np
-from numpy.typing import NDArray
 
 from spikecam_env.gap.candidates.strength import bounded, with_effect
 from spikecam_env.gap.compare.prediction import with_change_scaled
@@ -22,8 +21,6 @@ from spikecam_env.gap.fit.problem import Problem
 from spikecam_env.gap.unit.indirect_inference import extrapolated_unit
 from spikecam_env.gap.unit.refit import constrained_refit
 from spikecam_env.sensor import SensorModel
-
-Array = NDArray[np.float64]
 
 PAIR = ("dead_time", "photo_response_nonlinearity")
 

@@ -14,7 +14,6 @@ from dataclasses import replace
 from functools import partial
 
 import numpy as np
-from numpy.typing import NDArray
 
 from spikecam_env.gap.baseline.alarm import is_discrepant, with_held_out_motion
 from spikecam_env.gap.compare.distance import in_noise, is_significant, loss, residual
@@ -47,8 +46,6 @@ from spikecam_env.gap.search.round import (
 )
 from spikecam_env.gap.search.shortlist import fits_of, groups_that_stand_out, screened_beside, starts_to_fit
 from spikecam_env.gap.unit.refit import constrained_refit
-
-Array = NDArray[np.float64]
 
 SECOND = "a second effect"
 """Without having looked for it, nothing is named where something is left."""

@@ -18,7 +18,6 @@ from dataclasses import replace
 from functools import partial
 
 import numpy as np
-from numpy.typing import NDArray
 
 from spikecam_env.gap.candidates.table import candidate
 from spikecam_env.gap.compare.distance import is_significant, residual
@@ -33,9 +32,7 @@ from spikecam_env.gap.search.cancelling_pair import PAIR, fit_pair
 from spikecam_env.gap.search.choice import chosen_of, confirmed_in_order
 from spikecam_env.gap.search.round import Round
 from spikecam_env.gap.search.shortlist import fit_from, may_be_shaped, recordings_of
-
-Array = NDArray[np.float64]
-
+from spikecam_env.types import Floats
 
 # ---- another start of the same effect
 
@@ -160,7 +157,7 @@ def may_try_without_earlier(problem: Problem, count: int) -> bool:
     return problem.allows("a test of each effect found", cost, needed=True)
 
 
-def try_without_earlier(problem: Problem, found: Fit, earlier: Mapping[str, Array]) -> Fit:
+def try_without_earlier(problem: Problem, found: Fit, earlier: Mapping[str, Floats]) -> Fit:
     """All effects found so far together, without those that are no longer needed.
 
     Errors stay as large as the many twins of `found` have shown them: two twins may scatter little by chance.
@@ -182,7 +179,7 @@ def try_without_earlier(problem: Problem, found: Fit, earlier: Mapping[str, Arra
     return both
 
 
-def is_missed(problem: Problem, found: Fit, change: Array) -> bool:
+def is_missed(problem: Problem, found: Fit, change: Floats) -> bool:
     """Whether a prediction without a change (S,) leaves so much more misfit that no simulation is needed."""
     without = replace(found.prediction, mean=found.prediction.mean - change)
     return problem.misfit(without) > found.misfit + problem.settings.deviance.keep_untried
@@ -250,7 +247,7 @@ def try_more_draws(problem: Problem, found: Fit) -> Fit:
     return with_prediction(problem, found, replace(more, error=np.maximum(more.error, found.prediction.error)))
 
 
-def of_pattern(problem: Problem, found: Fit) -> Array:
+def of_pattern(problem: Problem, found: Fit) -> Floats:
     """(S,) what a fit leaves of the pattern, of all recordings, in noise; 0 elsewhere."""
     there = np.array([k.group == "pattern" for k in problem.null.keys])
     return np.where(there, residual(problem.null, problem.values, found.prediction), 0.0)

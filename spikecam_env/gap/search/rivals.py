@@ -11,16 +11,14 @@ from dataclasses import replace
 
 import numpy as np
 import scipy
-from numpy.typing import NDArray
 
 from spikecam_env.gap.compare.distance import residual_and_misfit
 from spikecam_env.gap.compare.prediction import Draw, Null, Prediction, own_variance, with_change_scaled
 from spikecam_env.gap.compare.step import scale_to
+from spikecam_env.types import Floats
 
-Array = NDArray[np.float64]
 
-
-def is_rival(null: Null, draws: Sequence[Draw], measured: Array, best: Prediction, other: Prediction) -> bool:
+def is_rival(null: Null, draws: Sequence[Draw], measured: Floats, best: Prediction, other: Prediction) -> bool:
     """Whether a measurement does not separate one candidate from another.
 
     It does if the lead of the best is larger than chance makes it in campaigns in which the other is true.
@@ -48,7 +46,7 @@ def is_rival(null: Null, draws: Sequence[Draw], measured: Array, best: Predictio
     return bool(scipy.stats.t.sf(above / max(sd, 1e-9), len(noise) - 1) > null.settings.judging.least_chance)
 
 
-def most_likely(null: Null, best: Prediction, other: Prediction) -> tuple[Array, Array]:
+def most_likely(null: Null, best: Prediction, other: Prediction) -> tuple[Floats, Floats]:
     """What a candidate most likely gives: where its twins do not clearly differ from the best's, the mean of both.
 
     Otherwise the chance of its few twins would count as its law.
@@ -63,7 +61,7 @@ def most_likely(null: Null, best: Prediction, other: Prediction) -> tuple[Array,
     return other.mean + share * apart, (1.0 - share) * own2
 
 
-def lead(null: Null, seen: Array, best: Prediction, other: Prediction) -> float:
+def lead(null: Null, seen: Floats, best: Prediction, other: Prediction) -> float:
     """Misfit by which `best` is better than `other`, each at the strength that suits `seen` (S,) best.
 
     Both are judged in the mean of their noises.  Two twins of each do not show which one's campaigns scatter more, and
@@ -74,6 +72,6 @@ def lead(null: Null, seen: Array, best: Prediction, other: Prediction) -> float:
     return left[0] - left[1]
 
 
-def rescaled(null: Null, seen: Array, predicted: Prediction) -> Prediction:
+def rescaled(null: Null, seen: Floats, predicted: Prediction) -> Prediction:
     """A prediction with its change from the null scaled to come nearest to what is seen."""
     return with_change_scaled(null, predicted, scale_to(null, seen, predicted)[0])

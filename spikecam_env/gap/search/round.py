@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from spikecam_env.gap.candidates.table import candidate, expected_events
 from spikecam_env.gap.compare.distance import is_significant
@@ -15,8 +14,7 @@ from spikecam_env.gap.settings import Deviance, Searching
 from spikecam_env.gap.twins.case import Case
 from spikecam_env.gap.unit.refit import BaseFit
 from spikecam_env.sensor import SensorModel
-
-Array = NDArray[np.float64]
+from spikecam_env.types import Floats
 
 
 @dataclass(frozen=True)
@@ -32,7 +30,7 @@ class Round:
     model: SensorModel
     base: BaseFit
     prediction: Prediction
-    rho: Array
+    rho: Floats
     misfit: float
     fits: tuple[Fit, ...] = ()
     rivals: tuple[str, ...] = ()

@@ -7,7 +7,6 @@ from concurrent.futures import ThreadPoolExecutor
 from functools import partial
 
 import numpy as np
-from numpy.typing import NDArray
 
 from spikecam_env.gap.candidates.table import acting_through, candidate
 from spikecam_env.gap.compare.prediction import Null
@@ -21,8 +20,7 @@ from spikecam_env.gap.screen.templates import Templates
 from spikecam_env.gap.settings import Searching
 from spikecam_env.gap.statistics.spectrum import frequency, spectrum, strongest_line
 from spikecam_env.gap.twins.case import Case
-
-Array = NDArray[np.float64]
+from spikecam_env.types import Floats
 
 
 def line_of(case: Case) -> float | None:
@@ -85,7 +83,7 @@ def takes_several_twins(name: str) -> bool:
     return candidate(name).random_course or candidate(name).few_pixels
 
 
-def groups_that_stand_out(null: Null, distance: Array) -> set[str]:
+def groups_that_stand_out(null: Null, distance: Floats) -> set[str]:
     """Groups of which a statistic stands out by itself, or is what stands out most.  distance: (S,) in noise."""
     least = min(null.settings.judging.shows, float(np.abs(distance).max()))
     return {k.group for k, d in zip(null.keys, distance, strict=True) if abs(d) >= least}

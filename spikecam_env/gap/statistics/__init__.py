@@ -23,9 +23,10 @@ from spikecam_env.gap.statistics import (
     step,
     timing,
 )
-from spikecam_env.gap.statistics.reading import Reading
+from spikecam_env.gap.statistics.reading import CampaignReading
+from spikecam_env.renamed import old_names
 
-GROUPS: dict[str, Callable[[Reading, int], dict[str, float]]] = {
+GROUPS: dict[str, Callable[[CampaignReading, int], dict[str, float]]] = {
     module.__name__.rsplit(".", 1)[1]: module.statistics
     for module in (rates, noise, intervals, drift, spectrum, timing, rows, neighbours, clock, step, moving)
 }
@@ -66,17 +67,17 @@ Labels and first-order laws are exact to no more: light labels to 2e-5, laws of 
 their root, to 1.  Source: docs/gap.md, "Known limits"."""
 
 
-def floor_of(key: Key) -> float:
+def floor_of(key: StatisticKey) -> float:
     """The least noise of a statistic, in its own unit."""
     return FLOORS.get(floor_family(key), 0.0)
 
 
-def floor_family(key: Key) -> tuple[str, str]:
+def floor_family(key: StatisticKey) -> tuple[str, str]:
     """(group, start of the name) of the statistics that share a floor with this one: the longest in FLOORS."""
     return key.group, max((n for g, n in FLOORS if g == key.group and key.name.startswith(n)), key=len, default="")
 
 
-class Key(NamedTuple):
+class StatisticKey(NamedTuple):
     """Which statistic: its group, the recording it is of, and its name in the group."""
 
     group: str
@@ -84,27 +85,30 @@ class Key(NamedTuple):
     name: str
 
 
-def statistics_bank(reading: Reading) -> dict[Key, float]:
+def statistics_bank(reading: CampaignReading) -> dict[StatisticKey, float]:
     """Every statistic of a campaign, but for those of the pattern."""
     found = {}
     for i, condition in enumerate(reading.conditions):
         for group, statistics in GROUPS.items():
             for name, value in statistics(reading, i).items():
-                found[Key(group, condition.name, name)] = value
+                found[StatisticKey(group, condition.name, name)] = value
     return found
 
 
-def pattern_bank(reading: Reading) -> dict[Key, float]:
+def pattern_bank(reading: CampaignReading) -> dict[StatisticKey, float]:
     """The pattern statistics of a measurement's rate maps: of the dark recording and of every flat."""
     found = {}
     for condition, o in zip(reading.conditions, reading.observations, strict=True):
         if condition.kind in ("dark", "flat"):
             for name, value in pattern.statistics(o.rate.reshape(o.shape)).items():
-                found[Key("pattern", condition.name, name)] = value
+                found[StatisticKey("pattern", condition.name, name)] = value
     return found
 
 
-def aligned(banks: list[dict[Key, float]]) -> tuple[list[Key], NDArray[np.float64]]:
+def aligned(banks: list[dict[StatisticKey, float]]) -> tuple[list[StatisticKey], NDArray[np.float64]]:
     """Statistics that every bank has, and their values (B, S)."""
     keys = [k for k in banks[0] if all(k in b for b in banks[1:])]
     return keys, np.array([[b[k] for k in keys] for b in banks])
+
+
+__getattr__ = old_names(__name__, {"Key": "StatisticKey"})

@@ -15,8 +15,8 @@ from numpy.typing import NDArray
 
 from spikecam_env.calibration.real import ideal_second_difference
 from spikecam_env.gap.observe.bit_passes import BESIDE_WHOLE
-from spikecam_env.gap.observe.observation import DIFFERENCES, Observation
-from spikecam_env.gap.statistics.reading import Reading, root
+from spikecam_env.gap.observe.observation import DIFFERENCES, ObservedRecording
+from spikecam_env.gap.statistics.reading import CampaignReading, root
 
 AT_WHOLE = 0.005
 """Distance of a mean interval from a whole number, up to which a pixel is counted [frames]."""
@@ -32,7 +32,7 @@ MOST_BANDS = 10
 """Bands at most: a disturbance that decays in a quarter of a frame is in two or three of ten."""
 
 
-def statistics(reading: Reading, i: int) -> dict[str, float]:
+def statistics(reading: CampaignReading, i: int) -> dict[str, float]:
     """whole b: pixels of band b within AT_WHOLE of a whole mean interval, counted; band 0 is at the top.
 
     late b, early b: of pixels within BESIDE_WHOLE, spikes a frame late (early) with the next one back on time, counted.
@@ -68,7 +68,9 @@ def bands(shape: tuple[int, int], frames: int) -> list[NDArray[np.bool_]]:
     return [band == b for b in range(count)]
 
 
-def _mean(o: Observation, excess: NDArray[np.float64], part: NDArray[np.bool_], j: int, name: str) -> dict[str, float]:
+def _mean(
+    o: ObservedRecording, excess: NDArray[np.float64], part: NDArray[np.bool_], j: int, name: str
+) -> dict[str, float]:
     terms = o.times.terms[part, j].sum()
     if terms < LEAST_DIFFERENCES:
         return {}

@@ -8,8 +8,8 @@ from __future__ import annotations
 import numpy as np
 
 from spikecam_env.gap.observe.conditions import STEADY
-from spikecam_env.gap.observe.observation import TIME_BLOCKS, Observation
-from spikecam_env.gap.statistics.reading import Reading, log, slope
+from spikecam_env.gap.observe.observation import TIME_BLOCKS, ObservedRecording
+from spikecam_env.gap.statistics.reading import CampaignReading, log, slope
 
 PARTS, PIECES = 8, 8
 """Equal parts of a dark recording whose intervals are compared, and pieces of each by which its scatter is measured."""
@@ -25,7 +25,7 @@ SCATTER = 2e-4
 """Relative standard error of the median part's mean, from which lateness is stated in units of that error."""
 
 
-def statistics(reading: Reading, i: int) -> dict[str, float]:
+def statistics(reading: CampaignReading, i: int) -> dict[str, float]:
     """trend: relative change of the array from start to end.  bend: half against half, curvature.  wander: log
     variance of what is left.  pixels: log variance of blocks within a pixel, about what all do.  pixel tail: of
     the one pixel in 50 that varies most, by mean.  late 0 .. 7, in the dark: `lateness`."""
@@ -50,7 +50,7 @@ def statistics(reading: Reading, i: int) -> dict[str, float]:
     return found | (lateness(o) if reading.conditions[i].kind == "dark" else {})
 
 
-def lateness(o: Observation) -> dict[str, float]:
+def lateness(o: ObservedRecording) -> dict[str, float]:
     """How much longer intervals are that end in each part of a recording, against each pixel's own mean; relative.
 
     In the dark pixels fire seldom but evenly: a slow change shows far better in the length of intervals than in their

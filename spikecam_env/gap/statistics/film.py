@@ -18,15 +18,14 @@ from spikecam_env.gap.observe.observation import BIN
 from spikecam_env.gap.unit.refit import BaseFit
 from spikecam_env.sensor import Keyframes
 from spikecam_env.sensor.between_keys import key_weights
-
-Pictures = NDArray[np.float32]
+from spikecam_env.types import Pictures
 
 FEATURES = ("level", "square", "delay", "skew", "lag 16", "lag 64", "lag 256", "lag 2000", "blur", "row", "column",
             "bloom")  # fmt: skip
 
 
 @dataclass(frozen=True)
-class Film:
+class FilmFeatures:
     """light: (bins, P) collected in each bin at gain 1.  basis: (n, bins P) its orthonormal features.
 
     size: (n,) of each feature before it was scaled, 0 where those before it span it.
@@ -37,13 +36,13 @@ class Film:
     size: NDArray[np.float64]
 
 
-def films(conditions: Sequence[Condition], shape: tuple[int, int]) -> dict[str, Film]:
+def films(conditions: Sequence[Condition], shape: tuple[int, int]) -> dict[str, FilmFeatures]:
     """The film of every recording with moving light, computed once."""
     found = {}
     for c in conditions:
         if c.kind == "moving" and c.light is not None:
             light = light_film(c.light, c.frames)
-            found[c.name] = Film(light, *film_features(light, shape))
+            found[c.name] = FilmFeatures(light, *film_features(light, shape))
     return found
 
 

@@ -8,10 +8,10 @@ from __future__ import annotations
 import numpy as np
 
 from spikecam_env.gap.observe.conditions import STEADY
-from spikecam_env.gap.statistics.reading import Reading, root
+from spikecam_env.gap.statistics.reading import CampaignReading, root
 
 
-def statistics(reading: Reading, i: int) -> dict[str, float]:
+def statistics(reading: CampaignReading, i: int) -> dict[str, float]:
     """short, long: intervals below 0.6 T - 1 and above 1.5 T + 1, counted.  length n: intervals of n frames, counted,
     where that is below half the interval of nearly all pixels."""
     if reading.conditions[i].kind not in STEADY:

@@ -9,10 +9,10 @@ import numpy as np
 
 from spikecam_env.gap.observe.observation import BIN
 from spikecam_env.gap.statistics.film import FEATURES
-from spikecam_env.gap.statistics.reading import Reading
+from spikecam_env.gap.statistics.reading import CampaignReading
 
 
-def statistics(reading: Reading, i: int) -> dict[str, float]:
+def statistics(reading: CampaignReading, i: int) -> dict[str, float]:
     """One number a feature: its share in what is left, over the feature's own size; left: log rms of the rest."""
     condition = reading.conditions[i]
     counts = reading.observations[i].film

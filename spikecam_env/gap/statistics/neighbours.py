@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from spikecam_env.gap.observe.conditions import STEADY
 from spikecam_env.gap.observe.observation import FRAME_LAGS
-from spikecam_env.gap.statistics.reading import Reading
+from spikecam_env.gap.statistics.reading import CampaignReading
 
 
-def statistics(reading: Reading, i: int) -> dict[str, float]:
+def statistics(reading: CampaignReading, i: int) -> dict[str, float]:
     """across n, down n: coincidences at a lag of n frames over those of independent phases, less one."""
     if reading.conditions[i].kind not in STEADY:
         return {}

@@ -11,10 +11,10 @@ import numpy as np
 from spikecam_env.calibration.jitter import second_difference
 from spikecam_env.gap.observe.conditions import STEADY
 from spikecam_env.gap.observe.observation import DIFFERENCES
-from spikecam_env.gap.statistics.reading import Reading, log
+from spikecam_env.gap.statistics.reading import CampaignReading, log
 
 
-def statistics(reading: Reading, i: int) -> dict[str, float]:
+def statistics(reading: CampaignReading, i: int) -> dict[str, float]:
     """variance: mean over pixels of interval variance less f(1-f), over T.  lag-1: pooled serial correlation.
 
     A_k: measured over expected from the refitted jitter, less one.  tail: pixels with much larger A_16 than most.

@@ -7,12 +7,10 @@ Compared with fresh units drawn from the model, not with the twin, whose pattern
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from spikecam_env.gap.statistics.reading import log, root, slope
 from spikecam_env.robust import LOWER, UPPER
-
-Array = NDArray[np.float64]
+from spikecam_env.types import Floats
 
 NARROW = 5e-4
 """Relative spread below which a map has no pattern: the error of rates read between whole frames."""
@@ -24,7 +22,7 @@ PATCHES_A_SIDE = 8
 """Patches along each side of the array."""
 
 
-def statistics(rate: Array) -> dict[str, float]:
+def statistics(rate: Floats) -> dict[str, float]:
     """Of a rate map (H, W).
 
     width: log of the robust relative spread.  low / high tail: how much further the 0.5 % and 99.5 % quantiles lie
@@ -70,7 +68,7 @@ def statistics(rate: Array) -> dict[str, float]:
     }
 
 
-def _furthest_patch(values: Array) -> float:
+def _furthest_patch(values: Floats) -> float:
     """The patch mean that is furthest from the median of patch means, times the root of a patch's pixels."""
     high, wide = (max(n // PATCHES_A_SIDE, 1) for n in values.shape)
     rows, columns = values.shape[0] // high, values.shape[1] // wide

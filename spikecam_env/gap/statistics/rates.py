@@ -9,10 +9,10 @@ from __future__ import annotations
 import numpy as np
 
 from spikecam_env.gap.observe.conditions import STEADY_KNOWN
-from spikecam_env.gap.statistics.reading import Reading, log, slope
+from spikecam_env.gap.statistics.reading import CampaignReading, log, slope
 
 
-def statistics(reading: Reading, i: int) -> dict[str, float]:
+def statistics(reading: CampaignReading, i: int) -> dict[str, float]:
     """level: mean relative residual.  slope: of the residual on the pixel's own rate.  scatter: log rms.
 
     corners: mean residual of each quarter of the array less the array's.

@@ -6,29 +6,28 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from spikecam_env.gap.observe.conditions import Condition
-from spikecam_env.gap.observe.observation import Observation
-from spikecam_env.gap.statistics.film import Film
+from spikecam_env.gap.observe.observation import ObservedRecording
+from spikecam_env.gap.statistics.film import FilmFeatures
 from spikecam_env.gap.unit.refit import BaseFit
-
-Array = NDArray[np.float64]
+from spikecam_env.renamed import old_names
+from spikecam_env.types import Floats
 
 
 @dataclass(frozen=True)
-class Reading:
+class CampaignReading:
     """One campaign, measured or simulated.  base: refitted from these observations and no others.
 
     films: of moving light, by recording (`film.films`).
     """
 
-    observations: Sequence[Observation]
+    observations: Sequence[ObservedRecording]
     conditions: Sequence[Condition]
     base: BaseFit
-    films: Mapping[str, Film]
+    films: Mapping[str, FilmFeatures]
 
-    def expected(self, i: int) -> Array:
+    def expected(self, i: int) -> Floats:
         """(P,) thresholds a frame of recording i, steady light, by the refit; its own rate where light is unknown."""
         condition = self.conditions[i]
         if condition.light is None:
@@ -46,7 +45,10 @@ def log(value: float, floor: float = 1e-12) -> float:
     return float(np.log(max(value, floor)))
 
 
-def slope(y: Array, x: Array) -> float:
+def slope(y: Floats, x: Floats) -> float:
     """Least-squares slope of y on x, both about their means."""
     x = x - x.mean()
     return float((x @ (y - y.mean())) / max(x @ x, 1e-30))
+
+
+__getattr__ = old_names(__name__, {"Reading": "CampaignReading"})

@@ -6,10 +6,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from spikecam_env.gap.observe.conditions import STEADY
-from spikecam_env.gap.statistics.reading import Reading, log
+from spikecam_env.gap.statistics.reading import CampaignReading, log
 
 
-def statistics(reading: Reading, i: int) -> dict[str, float]:
+def statistics(reading: CampaignReading, i: int) -> dict[str, float]:
     """row n, column n: log variance in time of a row's (column's) spikes in n frames less the array's share."""
     if reading.conditions[i].kind not in STEADY:
         return {}

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from spikecam_env.gap.observe.conditions import STEADY
-from spikecam_env.gap.statistics.reading import Reading, log
+from spikecam_env.gap.statistics.reading import CampaignReading, log
 
 BANDS = 8
 
@@ -38,7 +38,7 @@ def bands(frames: int) -> NDArray[np.int64]:
     return np.unique(np.round(np.geomspace(3, frames // 2, BANDS + 1)).astype(np.int64))
 
 
-def statistics(reading: Reading, i: int) -> dict[str, float]:
+def statistics(reading: CampaignReading, i: int) -> dict[str, float]:
     """band n: log power.  line: log of the strongest bin over what is around it, below a quarter of the rate."""
     if reading.conditions[i].kind not in STEADY:
         return {}

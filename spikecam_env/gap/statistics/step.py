@@ -10,7 +10,7 @@ import itertools
 import numpy as np
 from numpy.typing import NDArray
 
-from spikecam_env.gap.statistics.reading import Reading, slope
+from spikecam_env.gap.statistics.reading import CampaignReading, slope
 from spikecam_env.sensor.between_keys import frame_means
 
 EDGES = (0, 1, 2, 4, 8, 16, 32, 64, 128, 256)
@@ -34,7 +34,7 @@ def edges_of(level: NDArray[np.float64]) -> list[tuple[int, float]]:
     return [(t + 1, h) for t, h in found]
 
 
-def statistics(reading: Reading, i: int) -> dict[str, float]:
+def statistics(reading: CampaignReading, i: int) -> dict[str, float]:
     """up / down a-b: spikes missing or over, a to b frames after an edge, in frames of the step's height.
 
     row up / row down: the same of the first 4 frames, as a slope from the first row to the last.

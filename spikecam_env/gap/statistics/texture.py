@@ -8,12 +8,10 @@ from __future__ import annotations
 
 import numpy as np
 import scipy
-from numpy.typing import NDArray
 
 from spikecam_env.gap.statistics.reading import log
 from spikecam_env.robust import LOWER, UPPER, scatter
-
-Array = NDArray[np.float64]
+from spikecam_env.types import Floats
 
 QUANTILES = (0.001, 0.01, 0.1, 0.25, 0.75, 0.9, 0.99, 0.999)
 """Of the rates, over their median."""
@@ -28,7 +26,7 @@ _WINDOW = 5
 """Side of a pixel's neighbourhood [pixels]."""
 
 
-def statistics(rate: Array) -> dict[str, float]:
+def statistics(rate: Floats) -> dict[str, float]:
     """Of a map (H, W); nothing where its median is 0.
 
     fine: log spread of pixels about the mean of their neighbourhood, outliers clipped.  grain q: quantiles of

@@ -10,13 +10,13 @@ from __future__ import annotations
 import numpy as np
 
 from spikecam_env.gap.observe.conditions import STEADY
-from spikecam_env.gap.statistics.reading import Reading, log
+from spikecam_env.gap.statistics.reading import CampaignReading, log
 
 SLOWEST_INTERVAL = 1.5
 """Interval of the slowest pixels that count, over the mean interval; the statistic begins after so long."""
 
 
-def statistics(reading: Reading, i: int) -> dict[str, float]:
+def statistics(reading: CampaignReading, i: int) -> dict[str, float]:
     """late: log variance over frames of the mean lateness of their spikes, over that of spikes on their own.
 
     next: correlation of one frame's lateness with the next one's.  Of pixels without irregular intervals,

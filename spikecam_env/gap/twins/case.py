@@ -10,18 +10,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from spikecam_env.gap.observe.conditions import STEADY_KNOWN, Condition
-from spikecam_env.gap.observe.observation import Observation
+from spikecam_env.gap.observe.observation import ObservedRecording
 from spikecam_env.gap.settings import DiagnosisSettings
-from spikecam_env.gap.statistics import Key, pattern_bank, statistics_bank
-from spikecam_env.gap.statistics.film import Film, films
-from spikecam_env.gap.statistics.reading import Reading
+from spikecam_env.gap.statistics import StatisticKey, pattern_bank, statistics_bank
+from spikecam_env.gap.statistics.film import FilmFeatures, films
+from spikecam_env.gap.statistics.reading import CampaignReading
 from spikecam_env.gap.twins.budget import Budget
 from spikecam_env.gap.twins.simulate import FIRST_SEED
 from spikecam_env.gap.twins.unknown_scene import simulate_seen
 from spikecam_env.gap.unit.refit import BaseFit, free_refit
 from spikecam_env.sensor import SensorModel
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -34,10 +32,10 @@ class Case:
 
     shape: tuple[int, int]
     conditions: tuple[Condition, ...]
-    observations: tuple[Observation, ...]
-    films: Mapping[str, Film]
+    observations: tuple[ObservedRecording, ...]
+    films: Mapping[str, FilmFeatures]
     base: BaseFit
-    bank: dict[Key, float]
+    bank: dict[StatisticKey, float]
     seed: int
     jobs: int = 1
     frame_rate_hz: float = 40_000.0
@@ -54,16 +52,16 @@ class Case:
         """fit or holdout."""
         return next((c.use for c in self.conditions if c.name == recording), "fit")
 
-    def to_fit(self, keys: Sequence[Key]) -> NDArray[np.bool_]:
+    def to_fit(self, keys: Sequence[StatisticKey]) -> NDArray[np.bool_]:
         """(S,) which statistics are of recordings to fit."""
         return np.array([self.use(k.recording) == "fit" for k in keys], bool)
 
-    def held_out(self, keys: Sequence[Key]) -> NDArray[np.bool_]:
+    def held_out(self, keys: Sequence[StatisticKey]) -> NDArray[np.bool_]:
         """(S,) which statistics the gap is the mean of: those of recordings held out, or all where none is."""
         held = np.array([self.use(k.recording) == "holdout" for k in keys], bool)
         return held if held.any() else np.ones(len(keys), bool)
 
-    def of(self, conditions: Sequence[Condition], observations: Sequence[Observation]) -> Case:
+    def of(self, conditions: Sequence[Condition], observations: Sequence[ObservedRecording]) -> Case:
         """Other recordings of the same camera in the same unit of light, refitted anew."""
         other = case_of(self.shape, conditions, observations, self.seed, self.jobs, self.frame_rate_hz)
         return replace(other, nominal_per_label=self.nominal_per_label, settings=self.settings)
@@ -76,15 +74,15 @@ class Twin:
     pattern: statistics of the pattern of its rates, whose unit is the measured one.
     """
 
-    bank: dict[Key, float]
+    bank: dict[StatisticKey, float]
     base: BaseFit | None
-    pattern: dict[Key, float] = field(default_factory=dict)
+    pattern: dict[StatisticKey, float] = field(default_factory=dict)
 
 
 def case_of(
     shape: tuple[int, int],
     conditions: Sequence[Condition],
-    observations: Sequence[Observation],
+    observations: Sequence[ObservedRecording],
     seed: int = 0,
     jobs: int = 1,
     frame_rate_hz: float = 40_000.0,
@@ -92,7 +90,7 @@ def case_of(
     """Refit and statistics of a measurement."""
     moving = films(conditions, shape)
     base = free_refit(list(observations), list(conditions))
-    reading = Reading(observations, conditions, base, moving)
+    reading = CampaignReading(observations, conditions, base, moving)
     statistics = {**statistics_bank(reading), **pattern_bank(reading)}
     return Case(shape, tuple(conditions), tuple(observations), moving, base, statistics, seed, jobs, frame_rate_hz)
 
@@ -126,7 +124,7 @@ def _twin(case: Case, model: SensorModel, base: BaseFit, seed: int, only: Sequen
     seen = [case.observations[i] for i in which]
     observations = simulate_seen(model, base, conditions, seen, case.shape, seed, which, case.jobs)
     own = free_refit(observations, conditions) if refit_recordings(case) <= set(which) else None
-    reading = Reading(observations, conditions, own or refit, case.films)
+    reading = CampaignReading(observations, conditions, own or refit, case.films)
     return Twin(statistics_bank(reading), own, pattern_bank(reading))
 
 

@@ -6,17 +6,15 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from spikecam_env.gap.observe.conditions import Condition
-from spikecam_env.gap.statistics import Key, pattern
+from spikecam_env.gap.statistics import StatisticKey, pattern
 from spikecam_env.gap.unit.false_spikes import read_with_false_spikes
 from spikecam_env.gap.unit.refit import BaseFit, responds
 from spikecam_env.gap.unit.traps import drawn_traps, trap_level
 from spikecam_env.robust import scatter
 from spikecam_env.sensor import SensorModel
-
-Array = NDArray[np.float64]
+from spikecam_env.types import Floats
 
 SPREAD_PARAMETERS = {
     "gain": {"conversion_gain_spread": "sigma", "bias_voltage_spread": "sigma_V", "capacitor_spread": "sigma_fF"},
@@ -33,7 +31,7 @@ def drawn_banks(
     count: int,
     seed: int,
     limits: tuple[float, float],
-) -> list[dict[Key, float]]:
+) -> list[dict[StatisticKey, float]]:
     """Pattern statistics of `count` units of the model, at the measured unit's mean response, dark level and noise.
 
     The model's own spreads are scaled, within `limits` times what they are, so that the whole spread is the measured
@@ -76,13 +74,13 @@ def spread_factor(model: SensorModel, what: str, wanted: float, shape: tuple[int
     return float(np.sqrt(max(wanted**2 - others**2, 0.0) / own)) if own > 1e-10 else 1.0
 
 
-def width(values: Array) -> float:
+def width(values: Floats) -> float:
     """Robust relative spread: the scatter over the median."""
     middle = float(np.median(values))
     return scatter(values) / middle if middle > 0 else 0.0
 
 
-def drawn_response(model: SensorModel, base: BaseFit, shape: tuple[int, int], seed: int) -> tuple[Array, Array]:
+def drawn_response(model: SensorModel, base: BaseFit, shape: tuple[int, int], seed: int) -> tuple[Floats, Floats]:
     """gain, dark (P,) of a fresh unit of the model, scaled to the measured unit's medians."""
     unit = model.draw_unit(shape, seed)
     live, alive = base.live & (base.gain > 0), responds(unit.gain)
@@ -94,7 +92,7 @@ def drawn_response(model: SensorModel, base: BaseFit, shape: tuple[int, int], se
 
 def _pattern_statistics(
     model: SensorModel, base: BaseFit, shown: Sequence[Condition], shape: tuple[int, int], seed: int
-) -> dict[Key, float]:
+) -> dict[StatisticKey, float]:
     gain, dark = drawn_response(model, base, shape, seed)
     charge = drawn_traps(model, shape, seed)
     rng, phases, false = (np.random.default_rng([seed, n]) for n in (1, 2, 3))
@@ -111,5 +109,5 @@ def _pattern_statistics(
         read = np.where(count > 1, read, count / c.frames)  # as `Observation.rate`: one spike has no interval
         read = read_with_false_spikes(model, read, rate, phase, c.frames, false)
         for name, value in pattern.statistics(read.reshape(shape)).items():
-            found[Key("pattern", c.name, name)] = value
+            found[StatisticKey("pattern", c.name, name)] = value
     return found

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from spikecam_env.gap.observe.conditions import LABEL_ERROR, Condition
-from spikecam_env.gap.observe.observation import Observation, observe
+from spikecam_env.gap.observe.observation import ObservedRecording, observe
 from spikecam_env.gap.unit.conversion import unit_from_refit
 from spikecam_env.gap.unit.refit import BaseFit
 from spikecam_env.sensor import Keyframes, SensorModel, SpikeSensor, Unit
@@ -29,7 +29,7 @@ def simulate(
     shape: tuple[int, int],
     seed: int,
     takes: Sequence[int] | None = None,
-) -> list[Observation]:
+) -> list[ObservedRecording]:
     """One simulated campaign of the unit `base` under `model`; another seed is other temporal noise and phases.
 
     takes: number of each recording, by default in order; the same number and seed give the same draws.

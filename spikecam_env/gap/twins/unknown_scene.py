@@ -13,17 +13,15 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from spikecam_env.calibration.real import plausible_rates
 from spikecam_env.gap.observe.conditions import Condition
-from spikecam_env.gap.observe.observation import Observation
+from spikecam_env.gap.observe.observation import ObservedRecording
 from spikecam_env.gap.twins.simulate import simulate
 from spikecam_env.gap.twins.workers import at_once
 from spikecam_env.gap.unit.refit import BaseFit
 from spikecam_env.sensor import Keyframes, SensorModel
-
-Array = NDArray[np.float64]
+from spikecam_env.types import Floats
 
 FEWEST_SPIKES = 3
 """Fewest spikes for a rate; other pixels get the rate of two spikes."""
@@ -46,18 +44,18 @@ def simulate_seen(
     model: SensorModel,
     base: BaseFit,
     conditions: Sequence[Condition],
-    seen: Sequence[Observation],
+    seen: Sequence[ObservedRecording],
     shape: tuple[int, int],
     seed: int,
     takes: Sequence[int],
     jobs: int = 1,
-) -> list[Observation]:
+) -> list[ObservedRecording]:
     """As `simulate`, with unknown scenes lit so that their pixels fire as in `seen`, `jobs` recordings at once.
 
     Those that take longest are begun first, what moves and then what is bright: no thread waits for one at the end.
     """
 
-    def one(i: int) -> Observation:
+    def one(i: int) -> ObservedRecording:
         if conditions[i].kind == "unknown":
             return simulate_scene(model, base, conditions[i], seen[i], shape, seed, takes[i])
         return simulate(model, base, [conditions[i]], shape, seed, [takes[i]])[0]
@@ -68,8 +66,14 @@ def simulate_seen(
 
 
 def simulate_scene(
-    model: SensorModel, base: BaseFit, scene: Condition, seen: Observation, shape: tuple[int, int], seed: int, take: int
-) -> Observation:
+    model: SensorModel,
+    base: BaseFit,
+    scene: Condition,
+    seen: ObservedRecording,
+    shape: tuple[int, int],
+    seed: int,
+    take: int,
+) -> ObservedRecording:
     """One recording of an unknown scene, lit so that its pixels fire as in `seen`."""
     wanted = plausible_true_rates(seen, base.white, np.random.default_rng([seed, take]))
     light = np.minimum(np.maximum(wanted - base.dark, 0.0) / np.maximum(base.gain, 1e-9), BRIGHTEST)
@@ -85,7 +89,7 @@ def simulate_scene(
     return twin
 
 
-def plausible_true_rates(seen: Observation, white: float, rng: np.random.Generator) -> Array:
+def plausible_true_rates(seen: ObservedRecording, white: float, rng: np.random.Generator) -> Floats:
     """(P,) rates [thresholds/frame] that the pixels may have had."""
     few = seen.times.count < FEWEST_SPIKES
     known = replace(
@@ -97,7 +101,7 @@ def plausible_true_rates(seen: Observation, white: float, rng: np.random.Generat
     return np.asarray(plausible_rates(known, white, rng), np.float64)
 
 
-def correction(simulated: Array, wanted: Array) -> Array:
+def correction(simulated: Floats, wanted: Floats) -> Floats:
     """(P,) factor by which light misses, a smooth function of the rate: means of pixels of about the same one."""
     edges = np.unique(np.quantile(wanted, np.linspace(0.0, 1.0, _BINS + 1)))
     if edges.size < 3 or simulated.sum() == 0:
@@ -110,5 +114,5 @@ def correction(simulated: Array, wanted: Array) -> Array:
     return np.interp(wanted, mean, _limited(mean / np.maximum(got, 1e-9)))
 
 
-def _limited(factor: Array) -> Array:
+def _limited(factor: Floats) -> Floats:
     return np.clip(factor, 1.0 / MOST_AT_ONCE, MOST_AT_ONCE)

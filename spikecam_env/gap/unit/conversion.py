@@ -5,14 +5,12 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from spikecam_env.gap.unit.refit import NOISE, BaseFit
 from spikecam_env.gap.unit.traps import less_traps
 from spikecam_env.sensor import SensorModel
 from spikecam_env.sensor.unit import PixelArray, Unit, firing_law
-
-Array = NDArray[np.float64]
+from spikecam_env.types import Floats
 
 LINES = {"row_fixed_pattern": 1, "column_fixed_pattern": 0}
 """Offsets of the swing by row and column, and the axis along which they are the same: they change how noisy pixels are,
@@ -52,7 +50,7 @@ def exact_refit(unit: Unit) -> BaseFit:
     return BaseFit(unit.gain, unit.dark, zero, zero, white, np.zeros((0, unit.gain.size)), unit.gain > 0)
 
 
-def _swings(model: SensorModel, gain: Array, shape: tuple[int, int]) -> Array:
+def _swings(model: SensorModel, gain: Floats, shape: tuple[int, int]) -> Floats:
     """(P,) swing of each pixel over nominal, as its response lets expect: of what makes pixels differ by the model, a
     share is their bias, and a slow pixel is one whose swing is large, for which a millivolt is less.
 

@@ -7,12 +7,10 @@ their distance: few units have such a pixel, and it lies far out in the pattern.
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from spikecam_env.sensor import SensorModel
 from spikecam_env.sensor.effects.spurious_spikes import SpuriousSpikes
-
-Array = NDArray[np.float64]
+from spikecam_env.types import Floats
 
 
 def false_spikes_of(model: SensorModel) -> SpuriousSpikes | None:
@@ -21,8 +19,8 @@ def false_spikes_of(model: SensorModel) -> SpuriousSpikes | None:
 
 
 def read_with_false_spikes(
-    model: SensorModel, read: Array, rate: Array, phase: Array, frames: int, rng: np.random.Generator
-) -> Array:
+    model: SensorModel, read: Floats, rate: Floats, phase: Floats, frames: int, rng: np.random.Generator
+) -> Floats:
     """(P,) rates as read from a recording, `read`, with the spurious spikes that a model adds.
 
     rate: (P,) spikes a frame.  phase: (P,) share of an interval that had passed when the recording began.

@@ -15,8 +15,7 @@ from numpy.typing import NDArray
 
 from spikecam_env.gap.unit.refit import BaseFit, constrained_refit
 from spikecam_env.sensor import SensorModel
-
-Array = NDArray[np.float64]
+from spikecam_env.types import Floats
 
 
 def inferred_unit(
@@ -55,7 +54,7 @@ def gain_change(one: BaseFit, other: BaseFit) -> float:
     return abs(float(np.median(np.log(other.gain[both] / one.gain[both])))) if both.any() else 0.0
 
 
-def _surface(unit: BaseFit, known: NDArray[np.bool_], y: Array) -> Array:
+def _surface(unit: BaseFit, known: NDArray[np.bool_], y: Floats) -> Floats:
     """(P,) least-squares polynomial of second order through y, of the pixels `known`, over their gain and dark level;
     outliers of y are cut."""
     y = np.clip(y, *np.quantile(y, [0.02, 0.98]))

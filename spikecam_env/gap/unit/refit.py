@@ -15,10 +15,9 @@ from numpy.typing import NDArray
 from spikecam_env.calibration.jitter import fit_jitter
 from spikecam_env.calibration.response import fit_lines, rates_from_times, together
 from spikecam_env.gap.observe.conditions import STEADY_KNOWN, Condition
-from spikecam_env.gap.observe.observation import DIFFERENCES, Observation
+from spikecam_env.gap.observe.observation import DIFFERENCES, ObservedRecording
 from spikecam_env.sensor import SensorModel
-
-Array = NDArray[np.float64]
+from spikecam_env.types import Floats
 
 RESPONSE = ("conversion_gain_spread", "bias_voltage_spread", "capacitor_spread", "vignetting", "row_fixed_pattern",
             "column_fixed_pattern", "dead_pixels")  # fmt: skip
@@ -57,16 +56,16 @@ class BaseFit:
     live: (P,) pixels that respond; all where most get darker in more light, which labels are to blame for.
     """
 
-    gain: Array
-    dark: Array
-    gain_sd: Array
-    dark_sd: Array
+    gain: Floats
+    dark: Floats
+    gain_sd: Floats
+    dark_sd: Floats
     white: float
-    residual: Array
+    residual: Floats
     live: NDArray[np.bool_]
 
 
-def free_refit(observations: list[Observation], conditions: list[Condition]) -> BaseFit:
+def free_refit(observations: list[ObservedRecording], conditions: list[Condition]) -> BaseFit:
     """The free refit: every pixel its own line, from steady recordings of known light of use fit.
 
     Where no light is known, jitter alone: each pixel's line is rate = L.
@@ -88,20 +87,20 @@ def free_refit(observations: list[Observation], conditions: list[Condition]) -> 
     return BaseFit(gain, dark, np.sqrt(lines.var_gain), np.sqrt(lines.var_dark), white, residual, responds(gain))
 
 
-def responds(gain: Array) -> NDArray[np.bool_]:
+def responds(gain: Floats) -> NDArray[np.bool_]:
     """(P,) pixels with a tenth of the usual gain; all where most get darker in more light."""
     usual = np.median(gain)
     return gain > 0.1 * usual if usual > 0 else np.ones(gain.shape, bool)
 
 
-def _of_scenes(observations: list[Observation]) -> BaseFit:
+def _of_scenes(observations: list[ObservedRecording]) -> BaseFit:
     one = np.ones(observations[0].times.count.size)
     live = np.all([o.times.count > 1 for o in observations], axis=0)
     nothing = np.zeros((0, one.size))
     return BaseFit(one, 0.0 * one, 0.0 * one, 0.0 * one, pooled_jitter(observations), nothing, live)
 
 
-def pooled_jitter(observations: list[Observation]) -> float:
+def pooled_jitter(observations: list[ObservedRecording]) -> float:
     """s^2 pooled over steady recordings; UNSEEN_JITTER where they have too few second differences."""
     rate = np.stack(
         [np.where((o.times.count / o.frames > 0.9) | noisy_pixels(o), np.nan, o.times.rate) for o in observations]
@@ -112,7 +111,7 @@ def pooled_jitter(observations: list[Observation]) -> float:
     return jitter.white if jitter else UNSEEN_JITTER
 
 
-def noisy_pixels(o: Observation) -> NDArray[np.bool_]:
+def noisy_pixels(o: ObservedRecording) -> NDArray[np.bool_]:
     """(P,) pixels whose A_16 is far above the others', or with irregular intervals.
 
     A few pixels would bias the noise of all: one false spike in a pixel of three hundred adds half of it."""
@@ -139,7 +138,7 @@ def constrained_refit(model: SensorModel, base: BaseFit) -> BaseFit:
     return replace(base, gain=np.maximum(gain, 0.0), dark=np.maximum(dark, 0.0), white=white)
 
 
-def common_level(values: Array, errors: Array) -> float:
+def common_level(values: Floats, errors: Floats) -> float:
     """The level of all pixels: the mean of those that differ by their errors alone where most do, else the median.
 
     Rates are read between whole frames, and those of equal pixels lie on a lattice, of which a median is one step.

@@ -6,13 +6,11 @@ A refit finds that level in the pixels where the camera has its traps.  Twins ha
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from spikecam_env.sensor import SensorModel
 from spikecam_env.sensor.effects.random_telegraph_noise import RandomTelegraphNoise
 from spikecam_env.sensor.unit import Unit
-
-Array = NDArray[np.float64]
+from spikecam_env.types import Floats
 
 
 def traps_of(model: SensorModel) -> RandomTelegraphNoise | None:
@@ -20,12 +18,12 @@ def traps_of(model: SensorModel) -> RandomTelegraphNoise | None:
     return next((e for e in model.effects if isinstance(e, RandomTelegraphNoise)), None)
 
 
-def trap_charge(traps: RandomTelegraphNoise, unit: Unit, frame_rate_hz: float) -> Array:
+def trap_charge(traps: RandomTelegraphNoise, unit: Unit, frame_rate_hz: float) -> Floats:
     """(P,) charge that a trap brings in its upper state [thresholds/frame]."""
     return np.asarray(traps.amplitude_pA * 1e3 / frame_rate_hz / unit.threshold_fC, np.float64)
 
 
-def less_traps(model: SensorModel, unit: Unit, dark: Array) -> Array:
+def less_traps(model: SensorModel, unit: Unit, dark: Floats) -> Floats:
     """(P,) dark levels of a refit less the traps' mean charge; left there, twice as many pixels would have it.
 
     The pixels of the highest levels are taken for those with a trap; none of them falls below the median.
@@ -40,7 +38,7 @@ def less_traps(model: SensorModel, unit: Unit, dark: Array) -> Array:
     return np.asarray(out)
 
 
-def drawn_traps(model: SensorModel, shape: tuple[int, int], seed: int) -> Array:
+def drawn_traps(model: SensorModel, shape: tuple[int, int], seed: int) -> Floats:
     """(P,) `trap_charge` of a fresh unit of the model; 0 for pixels without a trap."""
     traps = traps_of(model)
     if traps is None:
@@ -49,7 +47,7 @@ def drawn_traps(model: SensorModel, shape: tuple[int, int], seed: int) -> Array:
     return np.where(has, trap_charge(traps, model.draw_unit(shape, seed), model.frame_rate_hz), 0.0)
 
 
-def trap_level(model: SensorModel, charge: Array, frames: int, rng: np.random.Generator) -> Array:
+def trap_level(model: SensorModel, charge: Floats, frames: int, rng: np.random.Generator) -> Floats:
     """(P,) mean level that traps of such charge add to one recording [thresholds/frame]: the upper state's share of the
     time is drawn from a beta distribution, with mean 1/2 and the variance of the effect's law."""
     traps = traps_of(model)

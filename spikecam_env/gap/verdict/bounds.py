@@ -12,7 +12,6 @@ from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
-from numpy.typing import NDArray
 
 from spikecam_env.gap.baseline.null_model import unit_under
 from spikecam_env.gap.candidates.strength import bounded
@@ -31,8 +30,7 @@ from spikecam_env.gap.verdict.score import (
     strength_of,
 )
 from spikecam_env.sensor import CATALOGUE, SensorModel
-
-Array = NDArray[np.float64]
+from spikecam_env.types import Floats
 
 LARGEST_SCALING = 40.0
 """Factor by which statistics are made larger or smaller at once, on the way to a score."""
@@ -43,7 +41,7 @@ MORE_EFFORT = "a larger --effort: the budget was spent"
 
 
 def bounds(
-    case: Case, model: SensorModel, null: Null, measured: Array, names: Sequence[str], templates: Templates
+    case: Case, model: SensorModel, null: Null, measured: Floats, names: Sequence[str], templates: Templates
 ) -> tuple[list[Bound], list[tuple[str, str]]]:
     """Upper bounds of effects that were not found.
 
@@ -110,7 +108,7 @@ class ScoredShape:
         return float(abs(self.score.parameters[strength_of(self.probe.name)]) * factor)
 
 
-def scored_shape(probe: TwinProbe | UnitProbe, measured: Array, start: Parameters) -> ScoredShape:
+def scored_shape(probe: TwinProbe | UnitProbe, measured: Floats, start: Parameters) -> ScoredShape:
     """A candidate at a strength where it shows well, from a start."""
     name, score, settings = probe.name, None, probe.settings
     least, most, power = settings.judging.shows, settings.bounding.most_effect_size, power_of(name)
@@ -127,12 +125,12 @@ def scored_shape(probe: TwinProbe | UnitProbe, measured: Array, start: Parameter
     return ScoredShape(probe, score, excess_of(score, measured))
 
 
-def excess_of(score: Score | None, measured: Array) -> float:
+def excess_of(score: Score | None, measured: Floats) -> float:
     """What a measurement scores beyond what is usual, at least 0."""
     return max(score.of(measured) - score.mean, 0.0) if score else 0.0
 
 
-def bound_of(measured: Array, shape: ScoredShape) -> Bound | tuple[str, str]:
+def bound_of(measured: Floats, shape: ScoredShape) -> Bound | tuple[str, str]:
     """The least refuted strength above which no tested strength is open; without one the name, with what is needed."""
     probe, name, key = shape.probe, shape.probe.name, strength_of(shape.probe.name)
     settings = probe.settings

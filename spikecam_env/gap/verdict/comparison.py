@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from spikecam_env.gap.baseline.alarm import is_discrepant
 from spikecam_env.gap.baseline.contradiction import Contradiction
@@ -16,8 +15,7 @@ from spikecam_env.gap.compare.prediction import Null
 from spikecam_env.gap.fit.problem import values_to_fit
 from spikecam_env.gap.twins.case import Case
 from spikecam_env.sensor import SensorModel
-
-Array = NDArray[np.float64]
+from spikecam_env.types import Floats
 
 
 @dataclass(frozen=True)
@@ -34,8 +32,8 @@ class Comparison:
     tested: SensorModel
     model: SensorModel
     null: Null
-    values: Array
-    given: Array
+    values: Floats
+    given: Floats
     missing: tuple[Missing, ...]
     off: OffNominal
     contradictions: tuple[Contradiction, ...]
@@ -43,7 +41,7 @@ class Comparison:
     not_testable: tuple[tuple[str, str], ...] = ()
 
     @property
-    def residuals(self) -> Array:
+    def residuals(self) -> Floats:
         """(S,) measured less the null model's mean, in noise."""
         return residual(self.null, self.values, self.null.prediction)
 
@@ -60,7 +58,7 @@ class Comparison:
         return float(adjusted(deviates(self.null, self.values)).min())
 
 
-def aligned_mean(other: Null, null: Null) -> Array:
+def aligned_mean(other: Null, null: Null) -> Floats:
     """(S,) predictions of another model for the statistics of `null`; where it has none, those of `null`."""
     known = dict(zip(other.keys, other.mean, strict=True))
     return np.array([known.get(k, m) for k, m in zip(null.keys, null.mean, strict=True)])

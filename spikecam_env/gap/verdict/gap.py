@@ -3,16 +3,14 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from spikecam_env.gap.compare.prediction import Null, Prediction
 from spikecam_env.gap.result import CHANCE, Gap
 from spikecam_env.gap.twins.case import Case
+from spikecam_env.types import Floats
 
-Array = NDArray[np.float64]
 
-
-def gap_of(case: Case, null: Null, values: Array, given: Array, after: Prediction, floor: float = CHANCE) -> Gap:
+def gap_of(case: Case, null: Null, values: Floats, given: Floats, after: Prediction, floor: float = CHANCE) -> Gap:
     """The gap of the model as given, whose predictions are (S,) `given`, and of one after; each in its own noise."""
     held = case.held_out(null.keys)
     wider = np.sqrt(np.maximum(after.spread**2 - null.sd**2, 0.0) + null.noise**2)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from spikecam_env.gap.baseline.motion import Motion
+from spikecam_env.gap.baseline.motion import DetectedMotion
 from spikecam_env.gap.baseline.static_part import static_pixels
 from spikecam_env.gap.result import Conclusion
 from spikecam_env.gap.settings import DiagnosisSettings
@@ -17,7 +17,7 @@ TO_DO_IN_KNOWN_LIGHT = "In known light, give the light over time (an .npz) as th
 
 
 def moves(
-    model: SensorModel, motion: tuple[Motion, ...], settings: DiagnosisSettings, *, static_only: bool
+    model: SensorModel, motion: tuple[DetectedMotion, ...], settings: DiagnosisSettings, *, static_only: bool
 ) -> Conclusion:
     """The verdict `data`: nothing was compared."""
     return Conclusion(
@@ -35,7 +35,7 @@ def moves(
     )
 
 
-def what_to_do(motion: tuple[Motion, ...], static_only: bool, least: float) -> list[str]:
+def what_to_do(motion: tuple[DetectedMotion, ...], static_only: bool, least: float) -> list[str]:
     """Steps that make the campaign usable.  least: share of pixels that has to be static."""
     share = float(static_pixels(motion).mean())
     advice = [TO_DO] if any(not m.light_known for m in motion) else []
@@ -46,7 +46,7 @@ def what_to_do(motion: tuple[Motion, ...], static_only: bool, least: float) -> l
     return advice
 
 
-def static_note(motion: tuple[Motion, ...]) -> list[str]:
+def static_note(motion: tuple[DetectedMotion, ...]) -> list[str]:
     """Notes on the pixels that were left out because they move."""
     if not motion:
         return []

@@ -16,12 +16,11 @@ from numpy.typing import NDArray
 from spikecam_env.gap.compare.distance import adjusted, in_noise, loss, normal_deviates, residual
 from spikecam_env.gap.compare.prediction import Null, Prediction
 from spikecam_env.gap.result import Remainder
-from spikecam_env.gap.statistics import Key
+from spikecam_env.gap.statistics import StatisticKey
+from spikecam_env.types import Floats
 
-Array = NDArray[np.float64]
 
-
-def explains(null: Null, values: Array, predicted: Prediction) -> bool:
+def explains(null: Null, values: Floats, predicted: Prediction) -> bool:
     """Whether a prediction leaves nothing of measured statistics (S,) but chance, or a remainder.
 
     A remainder is small in all (`most_left`) and wherever it is left (`most_left_there`), beside what the null model
@@ -36,7 +35,9 @@ def explains(null: Null, values: Array, predicted: Prediction) -> bool:
     return bool(not off.any() or (np.all(little) and deviance[1] < limits.most_left * deviance[0]))
 
 
-def remainder_of(null: Null, values: Array, predicted: Prediction, where: str = "", when: str = "") -> Remainder | None:
+def remainder_of(
+    null: Null, values: Floats, predicted: Prediction, where: str = "", when: str = ""
+) -> Remainder | None:
     """What a prediction leaves of measured statistics (S,) beyond chance; None where it leaves none.  where, when: as
     of `Remainder`."""
     off = is_left(null, values, predicted)
@@ -59,18 +60,18 @@ def remainder_of(null: Null, values: Array, predicted: Prediction, where: str = 
     )
 
 
-def is_left(null: Null, values: Array, predicted: Prediction) -> NDArray[np.bool_]:
+def is_left(null: Null, values: Floats, predicted: Prediction) -> NDArray[np.bool_]:
     """(S,) which of measured statistics a prediction leaves off, beyond chance and what laws are known to at all."""
     p = adjusted(normal_deviates(null, residual(null, values, predicted), predicted))
     return np.asarray(p < null.settings.judging.gate)
 
 
-def squares_left(null: Null, values: Array, predicted: Prediction) -> float:
+def squares_left(null: Null, values: Floats, predicted: Prediction) -> float:
     """Sum of squares, in the null model's noise, of the measured statistics (S,) that a prediction leaves off."""
     return float(np.sum(in_noise(null, values, predicted.mean)[is_left(null, values, predicted)] ** 2))
 
 
-def sums_by_place(keys: Sequence[Key], squares: Array) -> Array:
+def sums_by_place(keys: Sequence[StatisticKey], squares: Floats) -> Floats:
     """(S,) sum of (S,) squares over the same group of statistics of the same recording."""
     places = [(k.group, k.recording) for k in keys]
     of = {place: i for i, place in enumerate(dict.fromkeys(places))}
@@ -78,11 +79,11 @@ def sums_by_place(keys: Sequence[Key], squares: Array) -> Array:
     return np.asarray(np.bincount(place, squares)[place])
 
 
-def robust_beyond_chance(null: Null, rho: Array) -> float:
+def robust_beyond_chance(null: Null, rho: Floats) -> float:
     """Deviance of residuals (S,) beyond what chance makes: one that is far off counts by its logarithm."""
     return loss(null, rho) - float(np.sum(null.weight * np.ones(len(rho))))
 
 
-def beyond_chance(null: Null, distances: Array) -> float:
+def beyond_chance(null: Null, distances: Floats) -> float:
     """Sum of squares of distances (S,) beyond what chance makes, at least 0; by the null's weights."""
     return max(float(np.sum(null.weight * (distances**2 - 1.0))), 0.0)

@@ -15,7 +15,6 @@ from functools import partial
 
 import numpy as np
 import scipy
-from numpy.typing import NDArray
 
 from spikecam_env.gap.candidates.strength import with_effect
 from spikecam_env.gap.candidates.table import candidate, expected_events
@@ -29,8 +28,8 @@ from spikecam_env.gap.twins.case import Case
 from spikecam_env.gap.unit.indirect_inference import extrapolated_unit
 from spikecam_env.gap.unit.refit import BaseFit, constrained_refit
 from spikecam_env.sensor import CATALOGUE, SensorModel
+from spikecam_env.types import Floats
 
-Array = NDArray[np.float64]
 Parameters = dict[str, float]
 
 CONFIDENCE = 0.95
@@ -48,8 +47,8 @@ class Score:
     and laws are not known to.  rise: how much more it is at `parameters`, where the unit `bare` settled as `unit`.
     """
 
-    of: Callable[[Array], float]
-    without: Array
+    of: Callable[[Floats], float]
+    without: Floats
     error: float
     parameters: Parameters
     rise: float
@@ -109,7 +108,7 @@ class EffectProbe:
         return expected_events(self.name, parameters, self.case.conditions, self.case.observations)
 
     @staticmethod
-    def score_variance(score: Score, scores: Array, excess: float, events: float) -> float:
+    def score_variance(score: Score, scores: Floats, excess: float, events: float) -> float:
         """Of the score of a campaign with the effect, `excess` on average: what few campaigns show, and at least what
         there is without it and what so few events make."""
         by_chance = excess**2 / events
@@ -120,7 +119,7 @@ class TwinProbe(EffectProbe):
     """Scores of twins of the campaign.  The last draws, with the effect where it is strong, select statistics;
     the first, how they change where it is weak."""
 
-    def __init__(self, case: Case, model: SensorModel, null: Null, measured: Array, name: str):
+    def __init__(self, case: Case, model: SensorModel, null: Null, measured: Floats, name: str):
         super().__init__(case, model, null, name)
         self.only = recordings_affected(case, [name], null, measured, np.full(len(null.keys), np.inf))
         used = {case.conditions[i].name for i in self.only}
@@ -217,14 +216,18 @@ class UnitProbe(EffectProbe):
         sd = float(np.sqrt(self.score_variance(score, scores, excess, events) * (1 + 1 / n) + score.error**2))
         return StrengthTest(excess, sd, float(scipy.stats.t.ppf(CONFIDENCE, n - 1)), events)
 
-    def _units(self, model: SensorModel) -> Array:
+    def _units(self, model: SensorModel) -> Floats:
         units = with_drawn_pattern(self.case, model, self.null, self.null.prediction).units
         assert units is not None
         return units
 
 
 def linear(
-    null: Null, change: Array, without: Sequence[Array] | Array, parameters: Parameters, scatter: Array | float = 0.0
+    null: Null,
+    change: Floats,
+    without: Sequence[Floats] | Floats,
+    parameters: Parameters,
+    scatter: Floats | float = 0.0,
 ) -> Score | None:
     """The score along what an effect changes (S,) at some strength; None where it changes nothing.
 
@@ -241,13 +244,13 @@ def linear(
     return Score(of, np.array([of(v) for v in without]), error, parameters, float(weight @ deviates))
 
 
-def linear_score(null: Null, weight: Array, values: Array) -> float:
+def linear_score(null: Null, weight: Floats, values: Floats) -> float:
     """Score of statistics (S,) along a change; what is unknown counts for nothing."""
     most = null.settings.judging.clear
     return float(weight @ np.clip(in_noise(null, values), -most, most))
 
 
-def log_mean_square(null: Null, weight: Array, values: Array) -> float:
+def log_mean_square(null: Null, weight: Floats, values: Floats) -> float:
     """Score of statistics (S,) that an effect scatters, each way equally: the logarithm of their mean square."""
     square = float(weight @ in_noise(null, values) ** 2)
     return float(np.log(max(square, 1e-12)))

@@ -5,13 +5,11 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from spikecam_env.gap.compare.prediction import Null
 from spikecam_env.gap.twins.case import Case
 from spikecam_env.gap.verdict.where_and_when import when, where
-
-Array = NDArray[np.float64]
+from spikecam_env.types import Floats
 
 LEAST_LEVELS = 3
 """Flats on which a statistic has to be clearly off for its power of the level."""
@@ -20,7 +18,7 @@ _MEMORY = ("step", "moving")
 _COMMON = ("spectrum", "rows", "neighbours")
 
 
-def structure(case: Case, null: Null, off: Array) -> dict[str, Any]:
+def structure(case: Case, null: Null, off: Floats) -> dict[str, Any]:
     """Its description, as in `unknown` of diagnosis.json.
 
     off: (S,) measured less predicted, in noise, under the null model.
@@ -53,7 +51,7 @@ def structure(case: Case, null: Null, off: Array) -> dict[str, Any]:
     }
 
 
-def level_exponent(null: Null, off: Array, kind: dict[str, str], level: dict[str, float]) -> float | None:
+def level_exponent(null: Null, off: Floats, kind: dict[str, str], level: dict[str, float]) -> float | None:
     """Slope of log |statistic| on log level over the flats, of the statistic that is seen on most of them, the
     first of several."""
     best: tuple[float, float] | None = None

@@ -9,7 +9,6 @@ from functools import reduce
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from spikecam_env.gap.baseline.off_nominal import OffNominal, off_nominal, with_strengths
 from spikecam_env.gap.candidates.table import candidate
@@ -32,8 +31,7 @@ from spikecam_env.gap.verdict.remainder import explains, remainder_of, squares_l
 from spikecam_env.gap.verdict.structure import structure
 from spikecam_env.gap.verdict.where_and_when import when, where
 from spikecam_env.sensor import SensorModel
-
-Array = NDArray[np.float64]
+from spikecam_env.types import Floats
 
 
 def conclude(comparison: Comparison, rounds: Sequence[Round], floor: float) -> Conclusion:
@@ -148,7 +146,7 @@ def second_left_out(case: Case) -> bool:
     return SECOND in case.budget.left_out
 
 
-def with_stand_ins(case: Case, null: Null, values: Array, rounds: Sequence[Round]) -> list[Round]:
+def with_stand_ins(case: Case, null: Null, values: Floats, rounds: Sequence[Round]) -> list[Round]:
     """The rounds up to the one that is named: the last that explains the data and takes most of what the one before it
     leaves.  What takes less stands for details of that one's law.
 
@@ -225,7 +223,7 @@ def tied(found: Sequence[tuple[Fit, Round]]) -> dict[str, Any]:
     return {"members": members, "experiment": candidate(members[0]).experiment}
 
 
-def statistics_rows(comparison: Comparison, after: Array, left: Array) -> tuple[Statistic, ...]:
+def statistics_rows(comparison: Comparison, after: Floats, left: Floats) -> tuple[Statistic, ...]:
     """Every statistic under the model as given, and after: (S,) its mean, and what that leaves in noise."""
     case, null, values, given = comparison.case, comparison.null, comparison.values, comparison.given
     z = deviates(replace(null, mean=given), values)

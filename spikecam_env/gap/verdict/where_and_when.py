@@ -14,8 +14,7 @@ from spikecam_env.gap.observe.observation import TIME_BLOCKS
 from spikecam_env.gap.settings import Concluding, DiagnosisSettings
 from spikecam_env.gap.statistics.spectrum import spectrum, strongest_line
 from spikecam_env.gap.twins.case import Case
-
-Array = NDArray[np.float64]
+from spikecam_env.types import Floats
 
 FIELDS_PER_SIDE = 3
 """Fields along each side of the array."""
@@ -53,7 +52,7 @@ def fields_of(shape: tuple[int, int]) -> NDArray[np.int64]:
     return both
 
 
-def outlying_counts(irregular: Array, fields: NDArray[np.int64], limits: Concluding) -> NDArray[np.bool_]:
+def outlying_counts(irregular: Floats, fields: NDArray[np.int64], limits: Concluding) -> NDArray[np.bool_]:
     """(9,) fields with more irregular intervals, (P,) of each pixel, than the median field lets expect."""
     count = np.bincount(fields, irregular, FIELDS_PER_SIDE**2)
     share = np.bincount(fields, minlength=FIELDS_PER_SIDE**2) / fields.size
@@ -63,7 +62,7 @@ def outlying_counts(irregular: Array, fields: NDArray[np.int64], limits: Conclud
     return (count > limits.times_expected * expected) & more
 
 
-def outlying_means(values: Array, fields: NDArray[np.int64], settings: DiagnosisSettings) -> NDArray[np.bool_]:
+def outlying_means(values: Floats, fields: NDArray[np.int64], settings: DiagnosisSettings) -> NDArray[np.bool_]:
     """(9,) fields whose median of (P,) values, relative rates, stands out from its error, sqrt(pi / 2) sd / sqrt(n),
     from the scatter of the others, and by what is clear of what labels can be known to."""
     mean = np.array([np.median(values[fields == f]) for f in range(FIELDS_PER_SIDE**2)])
@@ -111,7 +110,7 @@ def when(case: Case) -> str:
     return "from about half of each recording on" if np.mean(votes) > 0.5 else "until about half of each recording"
 
 
-def later_half(halves: Array, noises: float, share: float) -> list[bool]:
+def later_half(halves: Floats, noises: float, share: float) -> list[bool]:
     """Whether there are more counts in the second half; nothing where that may be chance: halves that differ by less
     than `noises`, or by less than a share of all."""
     first, second = halves
@@ -128,7 +127,7 @@ def line_in_one_half(first: float, second: float, settings: DiagnosisSettings) -
     return [second > first] if clear else []
 
 
-def step_in_the_middle(blocks: Array, noises: float) -> list[bool]:
+def step_in_the_middle(blocks: Floats, noises: float) -> list[bool]:
     """A step of the array's rate in the middle, beyond what labels can be known to, that explains nearly all of its
     change: it is larger than `noises` times what it leaves."""
     whole = blocks[: TIME_BLOCKS // 2 * 2] / blocks.mean()

@@ -12,7 +12,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
-from spikecam_env.sensor.effects.base import Charge, Effect, Exposure, Stage, parameter
+from spikecam_env.sensor.effects.base import Charge, Effect, ExposureBlock, Stage, parameter
 from spikecam_env.sensor.effects.identification import Identification, Needs
 
 
@@ -35,5 +35,5 @@ class NewEffect(Effect):
     # One hook or more: imprint (a fixed pattern), image (optics), collect (charge), compare (thresholds), read_out
     # (bits); for what depends on spikes see base.py.  They are given a block of frames, arrays of (frames, rows,
     # columns), change nothing in place, and take time from `now`.
-    def collect(self, light: Charge, dark: Charge, now: Exposure, memory: Any) -> tuple[Charge, Charge, Any]:
+    def collect(self, light: Charge, dark: Charge, now: ExposureBlock, memory: Any) -> tuple[Charge, Charge, Any]:
         return light.scaled(1.0 - self.loss), dark, memory

@@ -16,8 +16,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from spikecam_env.sensor.effects.base import Acts, Effect, Exposure, Spikes, Stage, parameter
+from spikecam_env.sensor.effects.base import Acts, Effect, ExposureBlock, Stage, parameter
 from spikecam_env.sensor.effects.identification import Identification, Needs
+from spikecam_env.types import Masks
 
 
 class Pending(NamedTuple):
@@ -43,10 +44,10 @@ class Afterpulsing(Effect):
         share=("probability", "spikes"),
     )
 
-    def begin(self, first: Exposure, pattern: np.random.Generator, rng: np.random.Generator) -> Pending:
+    def begin(self, first: ExposureBlock, pattern: np.random.Generator, rng: np.random.Generator) -> Pending:
         return Pending(np.zeros(0, dtype=np.int64), rng)
 
-    def read_out(self, spikes: Spikes, now: Exposure, memory: Pending) -> tuple[Spikes, Pending]:
+    def read_out(self, spikes: Masks, now: ExposureBlock, memory: Pending) -> tuple[Masks, Pending]:
         pixels = now.shape[0] * now.shape[1]
         start = now.number * pixels
         at = np.flatnonzero(spikes)

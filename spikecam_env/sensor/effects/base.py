@@ -46,16 +46,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from spikecam_env.errors import InputError, unknown_name
+from spikecam_env.renamed import old_names
 from spikecam_env.sensor.effects.identification import Identification
 from spikecam_env.sensor.frame_moments import Moments
 from spikecam_env.sensor.ranges import check_parameters
 from spikecam_env.sensor.ranges import parameter as parameter
 from spikecam_env.sensor.unit import PixelArray, Unit
-
-Array = NDArray[np.float64]
-Field = NDArray[np.float32]
-Spikes = NDArray[np.bool_]
-
+from spikecam_env.types import Floats, Masks, Pictures
 
 PACKAGE = f"{__package__}."
 """Modules of the package's own effects begin with it; hooks of others are checked (`sensor/own_hooks.py`)."""
@@ -98,7 +95,7 @@ class Acts(Enum):
 
 
 @dataclasses.dataclass(frozen=True)
-class Exposure:
+class ExposureBlock:
     """A block of frames of one camera: what a hook may know.
 
     number: of its first frame, absolute, from 0.  shape: (rows, columns).  unit: the firing law of every pixel.
@@ -109,7 +106,7 @@ class Exposure:
 
     >>> from spikecam_env.sensor import SensorModel
     >>> unit = SensorModel.preset("ideal").draw_unit((2, 2), seed=0)
-    >>> Exposure(number=40, frame_rate_hz=40_000.0, shape=(2, 2), unit=unit, frames=2).start.ravel().tolist()
+    >>> ExposureBlock(number=40, frame_rate_hz=40_000.0, shape=(2, 2), unit=unit, frames=2).start.ravel().tolist()
     [40.0, 41.0]
     """
 
@@ -122,21 +119,21 @@ class Exposure:
     origin: float = 0.0
 
     @property
-    def start(self) -> Array:
+    def start(self) -> Floats:
         """When each frame begins (F, 1, 1) [frames]."""
         return (self.origin + self.number + np.arange(self.frames, dtype=np.float64))[:, None, None]
 
     @property
-    def middle_s(self) -> Array:
+    def middle_s(self) -> Floats:
         """Time of the middle of each frame (F, 1, 1) [s]."""
         return (self.start + 0.5) / self.frame_rate_hz
 
-    def piece(self, start: float, length: float) -> Exposure:
+    def piece(self, start: float, length: float) -> ExposureBlock:
         """A piece of one frame, from `start` in it on [frames]."""
         rate, origin = self.frame_rate_hz / length, (self.number + start) / length
         return dataclasses.replace(self, number=0, frame_rate_hz=rate, length=length, origin=origin)
 
-    def charge_of(self, current_pA: float) -> Array:
+    def charge_of(self, current_pA: float) -> Floats:
         """Charge (H, W) that a current brings in a frame of the camera [thresholds]."""
         return (current_pA * 1e3 / (self.frame_rate_hz * self.length) / self.unit.threshold_fC).reshape(self.shape)
 
@@ -150,7 +147,7 @@ class Few(NamedTuple):
     """
 
     pixels: NDArray[np.intp]
-    charge: Array
+    charge: Floats
 
 
 @dataclasses.dataclass(frozen=True)
@@ -169,13 +166,13 @@ class Charge:
     [[[0.1, 0.2]]]
     """
 
-    pixels: Array
-    factor: Array | float = 1.0
-    rise: Array | float = 0.0
+    pixels: Floats
+    factor: Floats | float = 1.0
+    rise: Floats | float = 0.0
     few: Few | None = None
-    tilt: Array | float = 0.0
+    tilt: Floats | float = 0.0
 
-    def scaled(self, factor: Array | float) -> Charge:
+    def scaled(self, factor: Floats | float) -> Charge:
         """This, times a number a frame or a row."""
         return Charge(self.pixels, self.factor * factor, self.rise, self.few, self.tilt * factor)
 
@@ -194,12 +191,12 @@ class Charge:
         return Charge(self.values, 1.0, self.rises, few)
 
     @property
-    def values(self) -> Array:
+    def values(self) -> Floats:
         """Multiplied out: (F, H, W), or (1, H, W) where all frames are alike."""
         pixels = self.pixels if self.few is None else self._with_few(self.few)
         return pixels if self._whole else pixels * self.factor
 
-    def _with_few(self, few: Few) -> Array:
+    def _with_few(self, few: Few) -> Floats:
         frames, (height, width) = len(few.charge), self.pixels.shape[1:]
         all_frames = np.empty((frames, height * width))
         all_frames[:] = self.pixels.reshape(-1, height * width)
@@ -207,7 +204,7 @@ class Charge:
         return all_frames.reshape(frames, height, width)
 
     @property
-    def rises(self) -> Array:
+    def rises(self) -> Floats:
         """`rise` and `tilt`, multiplied out."""
         rise = self.rise if self._whole else self.rise * self.factor
         return np.asarray(rise if isinstance(self.tilt, float) else rise + self.pixels * self.tilt)
@@ -230,8 +227,8 @@ class Shift:
     Shift(factor=1.0, millivolts=2.0)
     """
 
-    factor: Array | float = 1.0
-    millivolts: Array | Field | float = 0.0
+    factor: Floats | float = 1.0
+    millivolts: Floats | Pictures | float = 0.0
 
 
 class Feedback(NamedTuple):
@@ -259,7 +256,7 @@ class Feedback(NamedTuple):
     droop: float = 0.0
     kick_at_once: float = 0.0
 
-    def lost(self, rate: Array) -> Array:
+    def lost(self, rate: Floats) -> Floats:
         """Light (n,) that falls while a reset holds the node, of pixels with this charge a frame [thresholds]."""
         return self.lost_per_root_rate * np.sqrt(rate) + self.lost_per_rate * rate
 
@@ -276,11 +273,11 @@ class Bend(NamedTuple):
     (0.2, 0.0)
     """
 
-    mean: Array
-    uneven: Array
-    moved: Array
-    bent: Array
-    off_line: Array
+    mean: Floats
+    uneven: Floats
+    moved: Floats
+    bent: Floats
+    off_line: Floats
 
 
 @dataclasses.dataclass(frozen=True)
@@ -348,7 +345,7 @@ class Effect:
         """The picture (H, W) that reaches the pixels; linear in `radiance`."""
         return radiance
 
-    def begin(self, first: Exposure, pattern: np.random.Generator, rng: np.random.Generator) -> Any:
+    def begin(self, first: ExposureBlock, pattern: np.random.Generator, rng: np.random.Generator) -> Any:
         """What the effect remembers at frame 0; picklable.
 
         pattern: for what belongs to the unit, the same in all its recordings.  rng: for this recording.  Both are this
@@ -356,11 +353,11 @@ class Effect:
         """
         return rng
 
-    def collect(self, light: Charge, dark: Charge, now: Exposure, memory: Any) -> tuple[Charge, Charge, Any]:
+    def collect(self, light: Charge, dark: Charge, now: ExposureBlock, memory: Any) -> tuple[Charge, Charge, Any]:
         """Charge expected in these frames from light (at most two thresholds) and in the dark, and the memory."""
         return light, dark, memory
 
-    def compare(self, now: Exposure, memory: Any) -> tuple[Shift, Any]:
+    def compare(self, now: ExposureBlock, memory: Any) -> tuple[Shift, Any]:
         """How the comparators' reference moves in these frames, and the memory."""
         return Shift(), memory
 
@@ -369,11 +366,11 @@ class Effect:
         where it does not move within a frame."""
         return 0
 
-    def kinks(self, first: Exposure) -> tuple[float, ...]:
+    def kinks(self, first: ExposureBlock) -> tuple[float, ...]:
         """Phases of the array's clock [frames], in [0, 1), at which `sway` jumps."""
         return ()
 
-    def sway(self, now: Exposure, phase: Array, beside: Array) -> Shift:
+    def sway(self, now: ExposureBlock, phase: Floats, beside: Floats) -> Shift:
         """How the reference moves within these frames, at moments (H or 1, n) of each.
 
         phase: of the array's clock at those moments [frames]: 0 at the start of the frame, below 0 in the rows that
@@ -382,32 +379,34 @@ class Effect:
         """
         return Shift()
 
-    def lead(self, first: Exposure) -> Array | float:
+    def lead(self, first: ExposureBlock) -> Floats | float:
         """How long before the end of the array's frame each row is read (H, 1) [frames]."""
         return 0.0
 
-    def off_the_line(self, bend: Bend, now: Exposure) -> Array | float:
+    def off_the_line(self, bend: Bend, now: ExposureBlock) -> Floats | float:
         """How far `collect` may be off in a frame whose light bends (H, W) [thresholds]; `bent_light` adds what
         `sway` and `feedback` say."""
         return 0.0
 
-    def read_out(self, spikes: Spikes, now: Exposure, memory: Any) -> tuple[Spikes, Any]:
+    def read_out(self, spikes: Masks, now: ExposureBlock, memory: Any) -> tuple[Masks, Any]:
         """The bits reported (F, H, W), and the memory."""
         return spikes, memory
 
-    def react(self, threshold: Array, now: Exposure, memory: Any) -> Array:
+    def react(self, threshold: Floats, now: ExposureBlock, memory: Any) -> Floats:
         """What the comparators compare with in this frame (H, W), given what the effect remembers of spikes."""
         return threshold
 
-    def after_reset(self, residual: Array, rate: Array, now: Exposure) -> Array:
+    def after_reset(self, residual: Floats, rate: Floats, now: ExposureBlock) -> Floats:
         """Charge left on the pixels that fired (n,), given what is over their threshold and their charge a frame."""
         return residual
 
-    def spiked(self, charge: Array, spikes: Spikes, rate: Array, now: Exposure, memory: Any) -> tuple[Array, Any]:
+    def spiked(
+        self, charge: Floats, spikes: Masks, rate: Floats, now: ExposureBlock, memory: Any
+    ) -> tuple[Floats, Any]:
         """Charge at the end of the frame (H, W), given who fired in it and the charge a frame, and the memory."""
         return charge, memory
 
-    def feedback(self, first: Exposure) -> Feedback:
+    def feedback(self, first: ExposureBlock) -> Feedback:
         """What `react`, `after_reset` and `spiked` do."""
         return Feedback()
 
@@ -436,7 +435,7 @@ def having(hook: str, effects: Sequence[Effect]) -> list[Effect]:
     return [effect for effect in effects if effect.overrides(hook)]
 
 
-def neighbour_sum(values: Array) -> Array:
+def neighbour_sum(values: Floats) -> Floats:
     """Sum over each pixel's four neighbours (..., H, W); beyond the edge there is nothing.
 
     >>> neighbour_sum(np.ones((3, 3))).tolist()
@@ -480,3 +479,6 @@ def build(catalogue: dict[str, type[Effect]], name: str, parameters: dict[str, A
         if key not in allowed:
             raise unknown_name(f"parameter of {name}", key, allowed)
     return catalogue[name](**parameters)
+
+
+__getattr__ = old_names(__name__, {"Array": "Floats", "Exposure": "ExposureBlock", "Spikes": "Masks"})

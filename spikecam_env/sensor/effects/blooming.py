@@ -16,8 +16,9 @@ from typing import Any
 import numpy as np
 
 from spikecam_env.compiled import njit
-from spikecam_env.sensor.effects.base import Acts, Array, Charge, Effect, Exposure, Stage, parameter
+from spikecam_env.sensor.effects.base import Acts, Charge, Effect, ExposureBlock, Stage, parameter
 from spikecam_env.sensor.effects.identification import Identification, Needs
+from spikecam_env.types import Floats
 
 
 @dataclass(frozen=True)
@@ -37,7 +38,7 @@ class Blooming(Effect):
         shape_step=-0.1,
     )
 
-    def collect(self, light: Charge, dark: Charge, now: Exposure, memory: Any) -> tuple[Charge, Charge, Any]:
+    def collect(self, light: Charge, dark: Charge, now: ExposureBlock, memory: Any) -> tuple[Charge, Charge, Any]:
         half = np.abs(light.rises) / 2.0
         x = light.values
         if not (x + half > self.full).any():
@@ -50,7 +51,7 @@ class Blooming(Effect):
 
 
 @njit(cache=True, nogil=True, error_model="numpy", boundscheck=False)
-def _spill_over(x: Array, half: Array, share: float, full: float, out: Array) -> None:
+def _spill_over(x: Floats, half: Floats, share: float, full: float, out: Floats) -> None:
     """out (F, H, W), overwritten: the charge x, half more or less at a frame's ends, with what flows over."""
     frames, rows, columns = x.shape
     spill = np.zeros((rows + 2, columns + 2))  # beyond the edge there is nothing

@@ -25,8 +25,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from spikecam_env.sensor.effects.base import Acts, Array, Effect, Exposure, Shift, Stage, parameter
+from spikecam_env.sensor.effects.base import Acts, Effect, ExposureBlock, Shift, Stage, parameter
 from spikecam_env.sensor.effects.identification import Identification, Needs
+from spikecam_env.types import Floats
 
 PARTS_OF_TAU = 5
 """Parts of tau in which the decay is taken as linear: within (1/5)^2 / 8 of the amplitude."""
@@ -61,10 +62,10 @@ class ClockFeedthrough(Effect):
     def parts(self, frame_rate_hz: float) -> int:
         return math.ceil(PARTS_OF_TAU / self.tau(frame_rate_hz)) if self.amplitude_mV else 0
 
-    def kinks(self, first: Exposure) -> tuple[float, ...]:
+    def kinks(self, first: ExposureBlock) -> tuple[float, ...]:
         return (self.phase_frames % 1.0,)
 
-    def sway(self, now: Exposure, phase: Array, beside: Array) -> Shift:
+    def sway(self, now: ExposureBlock, phase: Floats, beside: Floats) -> Shift:
         tau = self.tau(now.frame_rate_hz)
         since = (phase - self.phase_frames) - np.floor(beside - self.phase_frames)
         mean = tau * (1.0 - math.exp(-1.0 / tau))

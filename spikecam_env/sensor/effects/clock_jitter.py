@@ -16,8 +16,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from spikecam_env.sensor.effects.base import Acts, Array, Bend, Charge, Effect, Exposure, Stage, parameter
+from spikecam_env.sensor.effects.base import Acts, Bend, Charge, Effect, ExposureBlock, Stage, parameter
 from spikecam_env.sensor.effects.identification import Identification, Needs
+from spikecam_env.types import Floats
 
 
 class Edge(NamedTuple):
@@ -37,10 +38,10 @@ class ClockJitter(Effect):
     wants_rise = True
     identification = Identification(family="common", square=True, needs=Needs.STEADY)
 
-    def begin(self, first: Exposure, pattern: np.random.Generator, rng: np.random.Generator) -> Edge:
+    def begin(self, first: ExposureBlock, pattern: np.random.Generator, rng: np.random.Generator) -> Edge:
         return Edge(rng.standard_normal(), rng)
 
-    def collect(self, light: Charge, dark: Charge, now: Exposure, memory: Edge) -> tuple[Charge, Charge, Edge]:
+    def collect(self, light: Charge, dark: Charge, now: ExposureBlock, memory: Edge) -> tuple[Charge, Charge, Edge]:
         edges = np.concatenate([[memory.at], memory.rng.standard_normal(now.frames)])
         late = (edges * (self.sigma_ns * 1e-9 * now.frame_rate_hz))[:, None, None]
         begin, end = late[:-1], late[1:]
@@ -51,5 +52,5 @@ class ClockJitter(Effect):
             read = Charge(read.values + rises * ((end + begin) * length / 2.0), 1.0, rises)
         return read, dark.scaled(length), Edge(edges[-1], memory.rng)
 
-    def off_the_line(self, bend: Bend, now: Exposure) -> Array:
+    def off_the_line(self, bend: Bend, now: ExposureBlock) -> Floats:
         return bend.bent * (self.sigma_ns * 1e-9 * now.frame_rate_hz)

@@ -15,7 +15,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from spikecam_env.sensor.effects.base import Acts, Effect, Exposure, Shift, Stage, parameter
+from spikecam_env.sensor.effects.base import Acts, Effect, ExposureBlock, Shift, Stage, parameter
 from spikecam_env.sensor.effects.identification import Identification, Needs
 
 
@@ -28,5 +28,5 @@ class CommonThresholdNoise(Effect):
     strength = "sigma_mV"
     identification = Identification(family="common", square=True, needs=Needs.STEADY)
 
-    def compare(self, now: Exposure, memory: np.random.Generator) -> tuple[Shift, np.random.Generator]:
+    def compare(self, now: ExposureBlock, memory: np.random.Generator) -> tuple[Shift, np.random.Generator]:
         return Shift(millivolts=self.sigma_mV * memory.standard_normal((now.frames, 1, 1))), memory

@@ -17,8 +17,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from spikecam_env.sensor.effects.base import Acts, Array, Effect, Exposure, Feedback, Stage, parameter
+from spikecam_env.sensor.effects.base import Acts, Effect, ExposureBlock, Feedback, Stage, parameter
 from spikecam_env.sensor.effects.identification import Identification, Needs
+from spikecam_env.types import Floats
 
 
 @dataclass(frozen=True)
@@ -30,12 +31,12 @@ class ComparatorDelay(Effect):
     strength = "delay_us"
     identification = Identification(family="saturation", needs=Needs.LEVELS)
 
-    def after_reset(self, residual: Array, rate: Array, now: Exposure) -> Array:
+    def after_reset(self, residual: Floats, rate: Floats, now: ExposureBlock) -> Floats:
         return residual - np.sqrt(rate) * self.delay(now)
 
-    def feedback(self, first: Exposure) -> Feedback:
+    def feedback(self, first: ExposureBlock) -> Feedback:
         return Feedback(lost_per_root_rate=self.delay(first))
 
-    def delay(self, now: Exposure) -> float:
+    def delay(self, now: ExposureBlock) -> float:
         """The delay c [frames]."""
         return self.delay_us * 1e-6 * now.frame_rate_hz

@@ -22,18 +22,9 @@ from typing import Any
 
 import numpy as np
 
-from spikecam_env.sensor.effects.base import (
-    Acts,
-    Array,
-    Effect,
-    Exposure,
-    Feedback,
-    Spikes,
-    Stage,
-    neighbour_sum,
-    parameter,
-)
+from spikecam_env.sensor.effects.base import Acts, Effect, ExposureBlock, Feedback, Stage, neighbour_sum, parameter
 from spikecam_env.sensor.effects.identification import Identification, Needs
+from spikecam_env.types import Floats, Masks
 
 
 @dataclass(frozen=True)
@@ -47,10 +38,12 @@ class Crosstalk(Effect):
     strength = "kick"
     identification = Identification(family="coupling", mixed=True, needs=Needs.STEADY)
 
-    def spiked(self, charge: Array, spikes: Spikes, rate: Array, now: Exposure, memory: Any) -> tuple[Array, Any]:
+    def spiked(
+        self, charge: Floats, spikes: Masks, rate: Floats, now: ExposureBlock, memory: Any
+    ) -> tuple[Floats, Any]:
         if self.when == "at_spike":
             return charge, memory
         return charge + self.kick * neighbour_sum(spikes.astype(np.float64)), memory
 
-    def feedback(self, first: Exposure) -> Feedback:
+    def feedback(self, first: ExposureBlock) -> Feedback:
         return Feedback(kick_at_once=self.kick) if self.when == "at_spike" else Feedback(kick=self.kick)

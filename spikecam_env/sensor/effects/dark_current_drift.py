@@ -13,7 +13,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
-from spikecam_env.sensor.effects.base import Acts, Charge, Effect, Exposure, Stage, parameter
+from spikecam_env.sensor.effects.base import Acts, Charge, Effect, ExposureBlock, Stage, parameter
 from spikecam_env.sensor.effects.identification import Identification, Needs
 from spikecam_env.sensor.frame_moments import mean_decay
 
@@ -30,6 +30,6 @@ class DarkCurrentDrift(Effect):
         family="dark", fitted=("rise", "tau_ms"), shapes={"tau_ms": (10.0, 50.0, 200.0)}, mixed=True, needs=Needs.DARK
     )
 
-    def collect(self, light: Charge, dark: Charge, now: Exposure, memory: Any) -> tuple[Charge, Charge, Any]:
+    def collect(self, light: Charge, dark: Charge, now: ExposureBlock, memory: Any) -> tuple[Charge, Charge, Any]:
         left = mean_decay(now.start, 1e-3 * self.tau_ms * now.frame_rate_hz)
         return light, dark.scaled(1.0 + self.rise * (1.0 - left)), memory

@@ -14,8 +14,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from spikecam_env.sensor.effects.base import Acts, Array, Effect, Exposure, Feedback, Stage, parameter
+from spikecam_env.sensor.effects.base import Acts, Effect, ExposureBlock, Feedback, Stage, parameter
 from spikecam_env.sensor.effects.identification import Identification, Needs
+from spikecam_env.types import Floats
 
 
 @dataclass(frozen=True)
@@ -27,12 +28,12 @@ class DeadTime(Effect):
     strength = "tau_us"
     identification = Identification(family="saturation", needs=Needs.LEVELS)
 
-    def after_reset(self, residual: Array, rate: Array, now: Exposure) -> Array:
+    def after_reset(self, residual: Floats, rate: Floats, now: ExposureBlock) -> Floats:
         return residual - rate * self.tau(now)
 
-    def feedback(self, first: Exposure) -> Feedback:
+    def feedback(self, first: ExposureBlock) -> Feedback:
         return Feedback(lost_per_rate=self.tau(first))
 
-    def tau(self, now: Exposure) -> float:
+    def tau(self, now: ExposureBlock) -> float:
         """The dead time [frames]."""
         return self.tau_us * 1e-6 * now.frame_rate_hz

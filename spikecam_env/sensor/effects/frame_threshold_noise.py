@@ -14,7 +14,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from spikecam_env.sensor.effects.base import Acts, Effect, Exposure, Shift, Stage, parameter
+from spikecam_env.sensor.effects.base import Acts, Effect, ExposureBlock, Shift, Stage, parameter
 from spikecam_env.sensor.effects.identification import Identification, Needs
 from spikecam_env.sensor.random_fields import Words, white_field, words
 
@@ -28,8 +28,8 @@ class FrameThresholdNoise(Effect):
     strength = "sigma_mV"
     identification = Identification(family="noise", square=True, needs=Needs.STEADY)
 
-    def begin(self, first: Exposure, pattern: np.random.Generator, rng: np.random.Generator) -> Words:
+    def begin(self, first: ExposureBlock, pattern: np.random.Generator, rng: np.random.Generator) -> Words:
         return words(rng)
 
-    def compare(self, now: Exposure, memory: Words) -> tuple[Shift, Words]:
+    def compare(self, now: ExposureBlock, memory: Words) -> tuple[Shift, Words]:
         return Shift(millivolts=white_field(memory, self.sigma_mV, now.number, now.frames, now.shape)), memory

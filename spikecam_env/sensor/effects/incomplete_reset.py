@@ -17,8 +17,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from spikecam_env.sensor.decay import LONG, decayed
-from spikecam_env.sensor.effects.base import Acts, Array, Effect, Exposure, Feedback, Spikes, Stage, parameter
+from spikecam_env.sensor.effects.base import Acts, Effect, ExposureBlock, Feedback, Stage, parameter
 from spikecam_env.sensor.effects.identification import Identification, Needs
+from spikecam_env.types import Floats, Masks
 
 
 @dataclass(frozen=True)
@@ -33,10 +34,12 @@ class IncompleteReset(Effect):
         family="reset", fitted=("fraction", "tau_us"), shapes={"tau_us": (50.0, 250.0, 1250.0)}, needs=Needs.LEVELS
     )
 
-    def begin(self, first: Exposure, pattern: np.random.Generator, rng: np.random.Generator) -> Array:
+    def begin(self, first: ExposureBlock, pattern: np.random.Generator, rng: np.random.Generator) -> Floats:
         return np.full(first.shape, -np.inf)
 
-    def spiked(self, charge: Array, spikes: Spikes, rate: Array, now: Exposure, memory: Array) -> tuple[Array, Array]:
+    def spiked(
+        self, charge: Floats, spikes: Masks, rate: Floats, now: ExposureBlock, memory: Floats
+    ) -> tuple[Floats, Floats]:
         at = np.flatnonzero(spikes)
         over = np.clip(charge.flat[at] / np.maximum(rate.flat[at], 1e-12), 0.0, 1.0)
         crossing, last = now.number + 1.0 - over, memory.copy()
@@ -46,9 +49,9 @@ class IncompleteReset(Effect):
         last.flat[at] = crossing
         return left, last
 
-    def feedback(self, first: Exposure) -> Feedback:
+    def feedback(self, first: ExposureBlock) -> Feedback:
         return Feedback(left=self.fraction, left_tau=self.tau(first))
 
-    def tau(self, now: Exposure) -> float:
+    def tau(self, now: ExposureBlock) -> float:
         """Time constant of filling [frames]."""
         return self.tau_us * 1e-6 * now.frame_rate_hz

@@ -18,8 +18,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from spikecam_env.sensor.effects.base import Acts, Array, Effect, Exposure, Feedback, Spikes, Stage, parameter
+from spikecam_env.sensor.effects.base import Acts, Effect, ExposureBlock, Feedback, Stage, parameter
 from spikecam_env.sensor.effects.identification import Identification, Needs
+from spikecam_env.types import Floats, Masks
 
 
 @dataclass(frozen=True)
@@ -37,14 +38,16 @@ class IrDrop(Effect):
         experiment="flats at several levels beside a picture with bright and dark rows",
     )
 
-    def begin(self, first: Exposure, pattern: np.random.Generator, rng: np.random.Generator) -> Array:
+    def begin(self, first: ExposureBlock, pattern: np.random.Generator, rng: np.random.Generator) -> Floats:
         return np.zeros((first.shape[0], 1))
 
-    def react(self, threshold: Array, now: Exposure, memory: Array) -> Array:
+    def react(self, threshold: Floats, now: ExposureBlock, memory: Floats) -> Floats:
         return threshold * (1.0 + self.droop * memory)
 
-    def spiked(self, charge: Array, spikes: Spikes, rate: Array, now: Exposure, memory: Array) -> tuple[Array, Array]:
+    def spiked(
+        self, charge: Floats, spikes: Masks, rate: Floats, now: ExposureBlock, memory: Floats
+    ) -> tuple[Floats, Floats]:
         return charge, spikes.mean(axis=1, keepdims=True)
 
-    def feedback(self, first: Exposure) -> Feedback:
+    def feedback(self, first: ExposureBlock) -> Feedback:
         return Feedback(droop=self.droop)

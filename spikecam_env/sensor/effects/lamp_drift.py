@@ -16,7 +16,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from spikecam_env.sensor.effects.base import Acts, Charge, Effect, Exposure, Stage, parameter
+from spikecam_env.sensor.effects.base import Acts, Charge, Effect, ExposureBlock, Stage, parameter
 from spikecam_env.sensor.effects.identification import Identification, Needs
 
 
@@ -39,10 +39,10 @@ class LampDrift(Effect):
     strength = "sigma_per_root_s"
     identification = Identification(family="light", square=True, needs=Needs.STEADY, random_course=True)
 
-    def begin(self, first: Exposure, pattern: np.random.Generator, rng: np.random.Generator) -> Walk:
+    def begin(self, first: ExposureBlock, pattern: np.random.Generator, rng: np.random.Generator) -> Walk:
         return Walk(0.0, rng, rng.spawn(1)[0])
 
-    def collect(self, light: Charge, dark: Charge, now: Exposure, memory: Walk) -> tuple[Charge, Charge, Walk]:
+    def collect(self, light: Charge, dark: Charge, now: ExposureBlock, memory: Walk) -> tuple[Charge, Charge, Walk]:
         sigma = self.sigma_per_root_s / math.sqrt(now.frame_rate_hz)
         steps, bridge = (sigma * rng.standard_normal(now.frames) for rng in (memory.rng, memory.within))
         path = np.cumsum(np.concatenate([[memory.at], steps]))

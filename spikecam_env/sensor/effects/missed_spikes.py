@@ -14,8 +14,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from spikecam_env.sensor.effects.base import Acts, Effect, Exposure, Spikes, Stage, parameter
+from spikecam_env.sensor.effects.base import Acts, Effect, ExposureBlock, Stage, parameter
 from spikecam_env.sensor.effects.identification import Identification, Needs
+from spikecam_env.types import Masks
 
 
 @dataclass(frozen=True)
@@ -28,8 +29,8 @@ class MissedSpikes(Effect):
     identification = Identification(family="readout", needs=Needs.STEADY, events=True, share=("probability", "spikes"))
 
     def read_out(
-        self, spikes: Spikes, now: Exposure, memory: np.random.Generator
-    ) -> tuple[Spikes, np.random.Generator]:
+        self, spikes: Masks, now: ExposureBlock, memory: np.random.Generator
+    ) -> tuple[Masks, np.random.Generator]:
         at = np.flatnonzero(spikes)
         kept = spikes.copy()
         kept.reshape(-1)[at[memory.random(at.size) < self.probability]] = False

@@ -13,7 +13,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
-from spikecam_env.sensor.effects.base import Acts, Charge, Effect, Exposure, Stage, parameter
+from spikecam_env.sensor.effects.base import Acts, Charge, Effect, ExposureBlock, Stage, parameter
 from spikecam_env.sensor.effects.identification import Identification, Needs
 
 
@@ -27,7 +27,7 @@ class PhotoResponseNonlinearity(Effect):
     wants_rise = True
     identification = Identification(family="saturation", needs=Needs.LEVELS)
 
-    def collect(self, light: Charge, dark: Charge, now: Exposure, memory: Any) -> tuple[Charge, Charge, Any]:
+    def collect(self, light: Charge, dark: Charge, now: ExposureBlock, memory: Any) -> tuple[Charge, Charge, Any]:
         x, d = light.values, light.rises
         collected = x * (1.0 - self.beta * x)
         if not d.any():

@@ -17,9 +17,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from spikecam_env.compiled import njit
-from spikecam_env.sensor.effects.base import Acts, Array, Charge, Effect, Exposure, Stage, parameter
+from spikecam_env.sensor.effects.base import Acts, Charge, Effect, ExposureBlock, Stage, parameter
 from spikecam_env.sensor.effects.identification import Identification, Needs
 from spikecam_env.sensor.frame_moments import decay_moment
+from spikecam_env.types import Floats
 
 
 @dataclass(frozen=True)
@@ -39,12 +40,12 @@ class PhotodiodeLag(Effect):
         only_contrast=True,
     )
 
-    def begin(self, first: Exposure, pattern: np.random.Generator, rng: np.random.Generator) -> None:
+    def begin(self, first: ExposureBlock, pattern: np.random.Generator, rng: np.random.Generator) -> None:
         return None
 
     def collect(
-        self, light: Charge, dark: Charge, now: Exposure, memory: Array | None
-    ) -> tuple[Charge, Charge, Array | None]:
+        self, light: Charge, dark: Charge, now: ExposureBlock, memory: Floats | None
+    ) -> tuple[Charge, Charge, Floats | None]:
         x, d = light.values, light.rises
         moves = bool(d.any())
         slow = (x[0] - 0.5 * d[0] if moves else x[0]) if memory is None else memory
@@ -56,7 +57,7 @@ class PhotodiodeLag(Effect):
         _follow(x, d, self.fraction, self._law(now), slow, late, rises)
         return Charge(late.reshape(shape), 1.0, rises.reshape(shape)), dark, slow.reshape(now.shape)
 
-    def _law(self, now: Exposure) -> tuple[float, ...]:
+    def _law(self, now: ExposureBlock) -> tuple[float, ...]:
         """What a frame makes of light x + d (t - 1/2) and of s, what lags at its start: see `_follow`."""
         tau = self.tau_us * 1e-6 * now.frame_rate_hz
         kept = math.exp(-1.0 / tau)
@@ -64,13 +65,15 @@ class PhotodiodeLag(Effect):
         return kept, 0.5 - tau + (0.5 + tau) * kept, mean, mean / 2.0 + tau * (mean - 1.0), tau + 0.5, decay_moment(tau)
 
 
-def _flat(values: Array, shape: tuple[int, int, int]) -> Array:
+def _flat(values: Floats, shape: tuple[int, int, int]) -> Floats:
     """(F, H, W), or (1, H, W) where all frames are alike, as (F or 1, P)."""
     return np.ascontiguousarray(np.broadcast_to(values, (len(values), *shape[1:]))).reshape(len(values), -1)
 
 
 @njit(cache=True, nogil=True, error_model="numpy", boundscheck=False)
-def _follow(x: Array, d: Array, fraction: float, law: tuple[float, ...], slow: Array, mean: Array, rise: Array) -> None:
+def _follow(
+    x: Floats, d: Floats, fraction: float, law: tuple[float, ...], slow: Floats, mean: Floats, rise: Floats
+) -> None:
     """mean, rise (F, P), overwritten: charge of which a part is late.  x, d: (F or 1, P).  slow (P,): what lags.
 
     What lags is s(t) = L(t) - d tau + (s - x + d/2 + d tau) exp(-t/tau).

@@ -18,8 +18,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from spikecam_env.sensor.effects.base import Acts, Array, Charge, Effect, Exposure, Few, Stage, parameter
+from spikecam_env.sensor.effects.base import Acts, Charge, Effect, ExposureBlock, Few, Stage, parameter
 from spikecam_env.sensor.effects.identification import Identification, Needs
+from spikecam_env.types import Floats
 
 AHEAD = 4096
 """Switches that are drawn at once."""
@@ -40,7 +41,7 @@ class Traps(NamedTuple):
 
     pixels: NDArray[np.intp]
     upper: NDArray[np.bool_]
-    charge: Array
+    charge: Floats
     switches: NDArray[np.int64]
     rng: np.random.Generator
 
@@ -64,13 +65,13 @@ class RandomTelegraphNoise(Effect):
         share=("fraction", "pixels"),
     )
 
-    def begin(self, first: Exposure, pattern: np.random.Generator, rng: np.random.Generator) -> Traps:
+    def begin(self, first: ExposureBlock, pattern: np.random.Generator, rng: np.random.Generator) -> Traps:
         pixels = np.flatnonzero(pattern.random(first.shape) < self.fraction)
         charge = first.charge_of(self.amplitude_pA).reshape(-1)[pixels]
         upper = rng.random(pixels.size) < 0.5
         return Traps(pixels, upper, charge, self._after(0, first.frame_rate_hz, rng), rng)
 
-    def collect(self, light: Charge, dark: Charge, now: Exposure, memory: Traps) -> tuple[Charge, Charge, Traps]:
+    def collect(self, light: Charge, dark: Charge, now: ExposureBlock, memory: Traps) -> tuple[Charge, Charge, Traps]:
         traps = memory.pixels.size
         end, to_come = now.frames * traps * TICKS, [memory.switches]
         while to_come[-1][-1] < end:
@@ -89,7 +90,7 @@ class RandomTelegraphNoise(Effect):
 
 def share_in_upper(
     upper: NDArray[np.bool_], switches: NDArray[np.int64], frames: int
-) -> tuple[Array, NDArray[np.bool_]]:
+) -> tuple[Floats, NDArray[np.bool_]]:
     """Share (F, n) of each frame that each trap spends in the upper state, and the state after them.
 
     upper: (n,) before them.  switches: as of `Traps`, those of these frames.

@@ -20,8 +20,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from spikecam_env.sensor.effects.base import Acts, Array, Charge, Effect, Exposure, Spikes, Stage, parameter
+from spikecam_env.sensor.effects.base import Acts, Charge, Effect, ExposureBlock, Stage, parameter
 from spikecam_env.sensor.effects.identification import Identification, Needs
+from spikecam_env.types import Floats, Masks
 
 
 @dataclass(frozen=True)
@@ -51,17 +52,17 @@ class ReadoutSkew(Effect):
         only_contrast=True,
     )
 
-    def begin(self, first: Exposure, pattern: np.random.Generator, rng: np.random.Generator) -> None:
+    def begin(self, first: ExposureBlock, pattern: np.random.Generator, rng: np.random.Generator) -> None:
         return None
 
-    def lead(self, first: Exposure) -> Array:
+    def lead(self, first: ExposureBlock) -> Floats:
         rows = first.shape[0]
         in_order = np.arange(rows)[:, None] / max(rows - 1, 1)
         return self.span * (1.0 - in_order) if self.span > 0.0 else -self.span * in_order
 
     def collect(
-        self, light: Charge, dark: Charge, now: Exposure, memory: tuple[Array, Array] | None
-    ) -> tuple[Charge, Charge, tuple[Array, Array]]:
+        self, light: Charge, dark: Charge, now: ExposureBlock, memory: tuple[Floats, Floats] | None
+    ) -> tuple[Charge, Charge, tuple[Floats, Floats]]:
         x, d = light.values, light.rises
         last, last_d = memory or (np.repeat(x[:1], 2, axis=0), np.zeros((2, *now.shape)))
         if len(x) == 1 and not d.any() and not last_d.any() and np.all(last == x[0]):
@@ -81,7 +82,7 @@ class ReadoutSkew(Effect):
         return Charge(read), dark, (x[-2:].copy(), d[-2:].copy())
 
 
-def _earlier(values: Array, over: Spikes) -> Array:
+def _earlier(values: Floats, over: Masks) -> Floats:
     """(F, H, W) by how much more there was in the frame before, of F + 2; of rows `over` (H, 1): one before that."""
     last = values[1:-1] - values[2:]
     return np.where(over, values[:-2] - values[1:-1], last) if over.any() else last

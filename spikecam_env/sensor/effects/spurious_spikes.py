@@ -16,8 +16,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from spikecam_env.sensor.effects.base import Acts, Effect, Exposure, Spikes, Stage, parameter
+from spikecam_env.sensor.effects.base import Acts, Effect, ExposureBlock, Stage, parameter
 from spikecam_env.sensor.effects.identification import Identification, Needs
+from spikecam_env.types import Masks
 
 _AT_ONCE = 256
 """Gaps drawn at a time."""
@@ -42,10 +43,10 @@ class SpuriousSpikes(Effect):
     strength = "probability"
     identification = Identification(family="readout", needs=Needs.STEADY, events=True, share=("probability", "frames"))
 
-    def begin(self, first: Exposure, pattern: np.random.Generator, rng: np.random.Generator) -> Strikes:
+    def begin(self, first: ExposureBlock, pattern: np.random.Generator, rng: np.random.Generator) -> Strikes:
         return Strikes(np.array([-1]), rng)
 
-    def read_out(self, spikes: Spikes, now: Exposure, memory: Strikes) -> tuple[Spikes, Strikes]:
+    def read_out(self, spikes: Masks, now: ExposureBlock, memory: Strikes) -> tuple[Masks, Strikes]:
         if self.probability == 0.0:
             return spikes, memory
         start = now.number * (spikes.size // now.frames)

@@ -19,8 +19,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from spikecam_env.sensor.effects.base import PARTS_OF_A_CYCLE, Acts, Array, Effect, Exposure, Shift, Stage, parameter
+from spikecam_env.sensor.effects.base import PARTS_OF_A_CYCLE, Acts, Effect, ExposureBlock, Shift, Stage, parameter
 from spikecam_env.sensor.effects.identification import Identification, Needs
+from spikecam_env.types import Floats
 
 
 @dataclass(frozen=True)
@@ -39,7 +40,7 @@ class SupplyRipple(Effect):
     def parts(self, frame_rate_hz: float) -> int:
         return max(1, math.ceil(PARTS_OF_A_CYCLE * self.frequency_hz / frame_rate_hz)) if self.ripple else 0
 
-    def sway(self, now: Exposure, phase: Array, beside: Array) -> Shift:
+    def sway(self, now: ExposureBlock, phase: Floats, beside: Floats) -> Shift:
         frame = (now.number + np.arange(now.frames, dtype=np.float64))[:, None, None]
         cycles = self.frequency_hz * ((frame + phase) / now.frame_rate_hz) + self.phase_cycles
         return Shift(factor=1.0 + self.ripple * np.sin(2.0 * np.pi * cycles))

@@ -11,8 +11,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from spikecam_env.sensor.effects.base import Acts, Array, Effect, Exposure, Feedback, Stage, parameter
+from spikecam_env.sensor.effects.base import Acts, Effect, ExposureBlock, Feedback, Stage, parameter
 from spikecam_env.sensor.effects.identification import Identification, Needs
+from spikecam_env.types import Floats
 
 
 @dataclass(frozen=True)
@@ -26,8 +27,8 @@ class SynchronousReset(Effect):
     strength = "fraction"
     identification = Identification(family="reset", needs=Needs.STEADY)
 
-    def after_reset(self, residual: Array, rate: Array, now: Exposure) -> Array:
+    def after_reset(self, residual: Floats, rate: Floats, now: ExposureBlock) -> Floats:
         return residual * (1.0 - self.fraction)
 
-    def feedback(self, first: Exposure) -> Feedback:
+    def feedback(self, first: ExposureBlock) -> Feedback:
         return Feedback(kept=1.0 - self.fraction)

@@ -17,7 +17,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from spikecam_env.sensor.effects.base import Acts, Effect, Exposure, Shift, Stage, parameter
+from spikecam_env.sensor.effects.base import Acts, Effect, ExposureBlock, Shift, Stage, parameter
 from spikecam_env.sensor.effects.identification import Identification, Needs
 from spikecam_env.sensor.random_fields import Words, octave_field, words
 
@@ -41,12 +41,12 @@ class ThresholdFlickerNoise(Effect):
     strength = "sigma_mV"
     identification = Identification(family="noise", square=True, needs=Needs.STEADY)
 
-    def begin(self, first: Exposure, pattern: np.random.Generator, rng: np.random.Generator) -> Octaves:
+    def begin(self, first: ExposureBlock, pattern: np.random.Generator, rng: np.random.Generator) -> Octaves:
         shape = (int(self.octaves), *first.shape)
         value = np.float32(self.sigma_mV) * rng.standard_normal(shape, dtype=np.float32)
         return Octaves(value, tuple(words(rng) for _ in range(shape[0])))
 
-    def compare(self, now: Exposure, memory: Octaves) -> tuple[Shift, Octaves]:
+    def compare(self, now: ExposureBlock, memory: Octaves) -> tuple[Shift, Octaves]:
         """An octave moves every eighth of its correlation time, no oftener than every frame."""
         tau = 2.0 ** (1 + np.arange(len(memory.words)))
         every = np.maximum(1, tau // 8)

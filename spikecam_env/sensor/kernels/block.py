@@ -21,12 +21,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from spikecam_env.sensor import drive
-from spikecam_env.sensor.effects.base import Array, Charge, Effect, Exposure, Feedback, Few, having
+from spikecam_env.sensor.effects.base import Charge, Effect, ExposureBlock, Feedback, Few, having
 from spikecam_env.sensor.kernels import block_loop, fast, loop
 from spikecam_env.sensor.kernels.quantile import MIN_ELECTRONS
 from spikecam_env.sensor.light import GRAINS, Piece, Ramp, Segment, pieces_of, rise_of
 from spikecam_env.sensor.unit import Unit
 from spikecam_env.threads import as_many_as_pay, together
+from spikecam_env.types import Floats
 
 _BLOCK = 1 << 22
 """Pixel-steps of a block, at most: what differs from pixel to pixel and frame to frame then takes 32 megabytes."""
@@ -66,8 +67,8 @@ class BlockLaw:
 
     gain: NDArray[np.float32]
     dark: NDArray[np.float32]
-    per_electron: Array
-    kappa_squared: Array
+    per_electron: Floats
+    kappa_squared: Floats
     polynomial: tuple[np.float32, ...]
 
     def __deepcopy__(self, memo: dict[int, Any]) -> BlockLaw:
@@ -84,18 +85,18 @@ class BlockState:
     """
 
     law: BlockLaw
-    charge: Array
-    threshold: Array
+    charge: Floats
+    threshold: Floats
     fired: NDArray[np.uint32]
-    activity: Array
-    crossing: Array
+    activity: Floats
+    crossing: Floats
     frame: int
     seeds: tuple[np.uint32, np.uint32]
     memory: drive.Memory
 
 
 def start(
-    first: Exposure, effects: Sequence[Effect], phase: Array, seed: int, unit_seed: int | None = None
+    first: ExposureBlock, effects: Sequence[Effect], phase: Floats, seed: int, unit_seed: int | None = None
 ) -> BlockState:
     """Pixels part-way through a cycle; arguments as for `reference.start`."""
     pixels = fast.start(first.unit, phase, seed)
@@ -115,7 +116,7 @@ def start(
 
 
 def run(
-    first: Exposure,
+    first: ExposureBlock,
     effects: Sequence[Effect],
     state: BlockState,
     segments: Iterable[Segment],
@@ -149,7 +150,7 @@ class _Part:
     count: int
 
 
-def _longest(first: Exposure, effects: Sequence[Effect]) -> int:
+def _longest(first: ExposureBlock, effects: Sequence[Effect]) -> int:
     """Frames of a block at most, whatever the light."""
     return max(min(_LONGEST, _NODES // (first.shape[0] * (drive.parts(first, effects) + 1))), 1)
 
@@ -199,10 +200,10 @@ def _alike(one: Ramp, other: Ramp) -> bool:
 
 
 def _block(
-    now: Exposure,
+    now: ExposureBlock,
     effects: Sequence[Effect],
     state: BlockState,
-    charge: tuple[Array, Array | float, Sequence[Piece]],
+    charge: tuple[Floats, Floats | float, Sequence[Piece]],
     spikes: NDArray[np.uint8],
     threads: int | None,
 ) -> None:
@@ -247,7 +248,7 @@ def _block(
         spikes[:] = drive.read_out(now, effects, state.memory, fired).reshape(spikes.shape)
 
 
-def _mean(parts: Sequence[_Part]) -> Array:
+def _mean(parts: Sequence[_Part]) -> Floats:
     """Charge of the light law (count, P) [thresholds], or (1, P) in steady light."""
     light = parts[0].light
     if light.steady:
@@ -260,22 +261,22 @@ def _mean(parts: Sequence[_Part]) -> Array:
     return mean
 
 
-def _rise(parts: Sequence[_Part]) -> Array:
+def _rise(parts: Sequence[_Part]) -> Floats:
     """Of that charge within a frame, as `_mean`."""
     if parts[0].light.steady:
         return np.zeros((1, parts[0].light.level.size))
     return np.repeat([p.light.rise / GRAINS for p in parts], [p.count for p in parts], axis=0)
 
 
-def _pixels(charge: Charge) -> Array:
+def _pixels(charge: Charge) -> Floats:
     return np.ascontiguousarray(charge.pixels).reshape(len(charge.pixels), -1)
 
 
-def _rows(factor: Array | float, now: Exposure) -> Array:
+def _rows(factor: Floats | float, now: ExposureBlock) -> Floats:
     return _plain(np.broadcast_to(factor, (now.frames, now.shape[0], 1))[:, :, 0])
 
 
-def _plain(values: Array) -> Array:
+def _plain(values: Floats) -> Floats:
     """In C order and writeable, though nobody writes: numba compiles `advance` anew for an array that is read-only."""
     return np.require(values, requirements=("C", "W"))
 

@@ -32,9 +32,8 @@ from spikecam_env.sensor.decay import LONG, decayed
 from spikecam_env.sensor.kernels.draws import GOLDEN, first_key, second_key, standard
 from spikecam_env.sensor.light import GRAINS, LEAST_LIMIT, MOST_GRAINS
 from spikecam_env.sensor.light import on_grid as rounded
+from spikecam_env.types import Floats, Pictures
 
-Doubles = NDArray[np.float64]
-Singles = NDArray[np.float32]
 Words = NDArray[np.uint32]
 Bytes = NDArray[np.uint8]
 Places = NDArray[np.int64]
@@ -43,13 +42,13 @@ Reset = tuple[float, ...]
 """The first three numbers of `Feedback`: per_root_rate, per_rate, kept."""
 Band = tuple[Places, Places, Places, Places]
 """Of its lines: row, first pixel, width, place; see `laid_out`."""
-Waves = tuple[Doubles, Doubles]
+Waves = tuple[Floats, Floats]
 """Factor and common [mV] at the nodes."""
 OfPixel = tuple[float, float, float]
 """Its field [mV], grains_per_mV, its load."""
-Wave = tuple[Doubles, Doubles, Doubles, OfPixel]
+Wave = tuple[Floats, Floats, Floats, OfPixel]
 """Of one pixel: nodes, factor and common there, and what is its own."""
-OfFew = tuple[Doubles, Doubles, Doubles, Doubles, Doubles]
+OfFew = tuple[Floats, Floats, Floats, Floats, Floats]
 """Light, dark, their factors (n,), and what comes besides (F, n)."""
 
 BAND = 1024
@@ -92,7 +91,7 @@ _INSIDE = BAND - 1  # a group's start masked with it is plainly not negative: nu
 
 @njit(cache=True, nogil=True, error_model="numpy", boundscheck=False)
 def ramp_charge(
-    level: NDArray[np.int32], curve: NDArray[np.int32], rest: NDArray[np.int32], first: int, out: Doubles
+    level: NDArray[np.int32], curve: NDArray[np.int32], rest: NDArray[np.int32], first: int, out: Floats
 ) -> None:
     """Charge of frames first .. of a key interval: out (F, P) float64 [thresholds], overwritten; see `light.Ramp`."""
     frames, pixels = out.shape
@@ -114,30 +113,30 @@ def advance(
     bottom: int,
     number: int,
     columns: int,
-    light: Doubles,
-    dark: Doubles,
+    light: Floats,
+    dark: Floats,
     few: Places,
-    extra: Doubles,
-    light_factor: Doubles,
-    dark_factor: Doubles,
-    factor: Doubles,
-    common: Doubles,
-    field: Singles,
-    grains_per_mV: Doubles,
-    at: Doubles,
-    swayed_factor: Doubles,
-    swayed_common: Doubles,
+    extra: Floats,
+    light_factor: Floats,
+    dark_factor: Floats,
+    factor: Floats,
+    common: Floats,
+    field: Pictures,
+    grains_per_mV: Floats,
+    at: Floats,
+    swayed_factor: Floats,
+    swayed_common: Floats,
     feedback: tuple[float, ...],
-    per_electron: Doubles,
-    kappa_squared: Doubles,
+    per_electron: Floats,
+    kappa_squared: Floats,
     polynomial: Polynomial,
     seed_low: np.uint32,
     seed_high: np.uint32,
-    charge: Doubles,
-    threshold: Doubles,
+    charge: Floats,
+    threshold: Floats,
     fired: Words,
-    activity: Doubles,
-    crossing: Doubles,
+    activity: Floats,
+    crossing: Floats,
     spikes: Bytes,
 ) -> None:
     """Frames `number` .. of the rows top .. bottom.  F frames, H rows of `columns` pixels, P pixels in all.
@@ -323,7 +322,7 @@ def gets(light: float, dark: float) -> float:
 
 
 @njit(inline="always")
-def differ(values: Doubles) -> bool:
+def differ(values: Floats) -> bool:
     """Whether any frame's differ from the first's."""
     return bool((values != values[0]).any())
 
@@ -343,7 +342,7 @@ def copy(values: NDArray[Any], out: NDArray[Any]) -> None:
 
 
 @njit(inline="always")
-def arrive(light: Doubles, dark: Doubles, light_factor: float, dark_factor: float, out: Doubles) -> None:
+def arrive(light: Floats, dark: Floats, light_factor: float, dark_factor: float, out: Floats) -> None:
     """Charge of a row in one frame [grains]."""
     for j in range(out.size):
         out[j] = gets(light[j] * light_factor, dark[j] * dark_factor)
@@ -351,15 +350,15 @@ def arrive(light: Doubles, dark: Doubles, light_factor: float, dark_factor: floa
 
 @njit(inline="always")
 def references(
-    grains_per_mV: Doubles,
-    field: Singles,
-    phi: Doubles,
+    grains_per_mV: Floats,
+    field: Pictures,
+    phi: Floats,
     factor: float,
     common: float,
     load: float,
-    moved: Doubles,
-    stands: Doubles,
-    limit: Doubles,
+    moved: Floats,
+    stands: Floats,
+    limit: Floats,
 ) -> None:
     """Of a line in one frame [grains]: what moves the references, where they stand at a reset, where pixels fire."""
     for j in range(limit.size):
@@ -371,7 +370,7 @@ def references(
 
 
 @njit(inline="always")
-def collect(held: Doubles, arrives: Doubles, limit: Doubles, used: int, hit: Bytes) -> None:
+def collect(held: Floats, arrives: Floats, limit: Floats, used: int, hit: Bytes) -> None:
     """One frame's charge; hit: whose reaches the limit."""
     for j in range(used):
         c = held[j] + arrives[j]
@@ -391,12 +390,12 @@ def find_live(eights: NDArray[np.uint64], groups: int, live: Places) -> int:
 
 @njit(nogil=True, error_model="numpy", boundscheck=False)
 def wake(
-    x: Doubles,
+    x: Floats,
     words: Words,
     live: Places,
     groups: int,
-    per_electron: Doubles,
-    kappa_squared: Doubles,
+    per_electron: Floats,
+    kappa_squared: Floats,
     seed_low: np.uint32,
     seed_high: np.uint32,
 ) -> None:
@@ -414,7 +413,7 @@ def wake(
 
 
 @njit(nogil=True, error_model="numpy", boundscheck=False)
-def fire(x: Doubles, words: Words, hit: Bytes, live: Places, groups: int, reset: Reset, polynomial: Polynomial) -> int:
+def fire(x: Floats, words: Words, hit: Bytes, live: Places, groups: int, reset: Reset, polynomial: Polynomial) -> int:
     """Reset the pixels that fire, draw their next thresholds; returns how many are at these already.
 
     x, words, hit: the scratch, as float64, uint32 and, of row HIT alone, uint8.
@@ -444,7 +443,7 @@ def fire(x: Doubles, words: Words, hit: Bytes, live: Places, groups: int, reset:
 
 
 @njit(inline="always")
-def find_due(x: Doubles, words: Words, live: Places, groups: int) -> None:
+def find_due(x: Floats, words: Words, live: Places, groups: int) -> None:
     """Mark the pixels of live groups that are at their limit."""
     for g in range(groups):
         q = live[g] & _INSIDE
@@ -453,7 +452,7 @@ def find_due(x: Doubles, words: Words, live: Places, groups: int) -> None:
 
 
 @njit(nogil=True, error_model="numpy", boundscheck=False)
-def fire_due(x: Doubles, words: Words, live: Places, groups: int, reset: Reset, polynomial: Polynomial) -> int:
+def fire_due(x: Floats, words: Words, live: Places, groups: int, reset: Reset, polynomial: Polynomial) -> int:
     """As `fire`, of the pixels that are due; what is kept of the others is as it was, as after a spike before it in the
     frame.  Lists the groups in which some are at their limit again, and returns their number.
 
@@ -489,17 +488,17 @@ def fire_due(x: Doubles, words: Words, live: Places, groups: int, reset: Reset, 
 
 @njit(nogil=True, error_model="numpy", boundscheck=False)
 def fire_within(
-    x: Doubles,
+    x: Floats,
     words: Words,
     hit: Bytes,
     live: Places,
     groups: int,
     band: Band,
-    at: Doubles,
+    at: Floats,
     waves: Waves,
-    field: Singles,
-    grains_per_mV: Doubles,
-    loads: Doubles,
+    field: Pictures,
+    grains_per_mV: Floats,
+    loads: Floats,
     reset: Reset,
     polynomial: Polynomial,
 ) -> None:
@@ -528,14 +527,14 @@ def fire_within(
 
 @njit(nogil=True, error_model="numpy", boundscheck=False)
 def meet(
-    x: Doubles,
+    x: Floats,
     hit: Bytes,
     h0: int,
     n: int,
     near: Places,
-    of_row: tuple[Doubles, Waves],
-    field: Singles,
-    grains_per_mV: Doubles,
+    of_row: tuple[Floats, Waves],
+    field: Pictures,
+    grains_per_mV: Floats,
     load: float,
 ) -> None:
     """Of a line of n pixels from place h0 on, those that hit their least limit: who fires, from moment AT on, at which
@@ -558,14 +557,14 @@ def meet(
 
 @njit(nogil=True, error_model="numpy", boundscheck=False)
 def fire_in_turn(
-    scratch: Doubles,
+    scratch: Floats,
     bits: Bytes,
     lines: Places,
-    at: Doubles,
+    at: Floats,
     waves: Waves,
-    field: Singles,
-    grains_per_mV: Doubles,
-    loads: Doubles,
+    field: Pictures,
+    grains_per_mV: Floats,
+    loads: Floats,
     kick: float,
     reset: Reset,
     polynomial: Polynomial,
@@ -624,7 +623,7 @@ def fire_in_turn(
 
 
 @njit(inline="always")
-def kicked(x: Doubles, o: int, j: int, kick: float) -> None:
+def kicked(x: Floats, o: int, j: int, kick: float) -> None:
     """Give a pixel charge [grains] that brings no shot noise: its threshold loses that of as many electrons."""
     noise, jitter = x[o + _NOISE + j], x[o + _JITTER + j]
     x[o + _HELD + j] += kick
@@ -650,7 +649,7 @@ def row_waves(row: int, waves: Waves) -> Waves:
 
 @njit(inline="always")
 def pixel_law(
-    p: int, columns: int, at: Doubles, waves: Waves, field: Singles, grains_per_mV: Doubles, loads: Doubles
+    p: int, columns: int, at: Floats, waves: Waves, field: Pictures, grains_per_mV: Floats, loads: Floats
 ) -> Wave:
     """How one pixel's reference moves: nodes, factor and common there, field, grains_per_mV, load."""
     row = p // columns
@@ -667,7 +666,7 @@ def limit_at(phi: float, factor: float, common: float, of_pixel: OfPixel) -> flo
 
 @njit(inline="always")
 def next_crossing(
-    x: Doubles, o: int, j: int, since: float, at: Doubles, factor: Doubles, common: Doubles, of_pixel: OfPixel
+    x: Floats, o: int, j: int, since: float, at: Floats, factor: Floats, common: Floats, of_pixel: OfPixel
 ) -> tuple[float, float]:
     """`crossing.first_crossing` of place j of the scratch that begins at o, whose charge is up to its least limit by
     the end of the frame: looked for from the node on before which it is not up to that."""
@@ -689,7 +688,7 @@ def next_crossing(
 
 
 @njit(inline="always")
-def stands_at(moment: float, at: Doubles, factor: Doubles, common: Doubles, of_pixel: OfPixel) -> float:
+def stands_at(moment: float, at: Floats, factor: Floats, common: Floats, of_pixel: OfPixel) -> float:
     """Where the reference of the nominal threshold stands at a moment [grains]."""
     last = at.size - 1
     k = int(moment * last)
@@ -705,7 +704,7 @@ def stands_at(moment: float, at: Doubles, factor: Doubles, common: Doubles, of_p
 
 @njit(nogil=True, error_model="numpy", boundscheck=False)
 def spike(
-    x: Doubles,
+    x: Floats,
     words: Words,
     o: int,
     j: int,
@@ -732,7 +731,7 @@ def spike(
 
 @njit(nogil=True, error_model="numpy", boundscheck=False)
 def stay(
-    x: Doubles,
+    x: Floats,
     words: Words,
     hit: Bytes,
     live: Places,
@@ -767,7 +766,7 @@ def stay(
 
 @njit(nogil=True, error_model="numpy", boundscheck=False)
 def cross_again(
-    x: Doubles, words: Words, j: int, end: float, left: float, left_tau: float, reset: Reset, polynomial: Polynomial
+    x: Floats, words: Words, j: int, end: float, left: float, left_tau: float, reset: Reset, polynomial: Polynomial
 ) -> None:
     """Resets of a pixel that what stayed takes to its threshold once more, MOST_AGAIN at most, in the frame whose bit
     is set already; the law is that of `fire` and `stay`."""
@@ -792,7 +791,7 @@ def cross_again(
 
 @njit(nogil=True, error_model="numpy", boundscheck=False)
 def jump(
-    x: Doubles,
+    x: Floats,
     words: Words,
     live: Places,
     groups: int,
@@ -875,7 +874,7 @@ def jump(
 
 
 @njit(nogil=True, error_model="numpy", boundscheck=False)
-def note(x: Doubles, words: Words, live: Places, groups: int, of_few: OfFew, spikes: Bytes) -> int:
+def note(x: Floats, words: Words, live: Places, groups: int, of_few: OfFew, spikes: Bytes) -> int:
     """What happened to the pixels of live groups: a spike where they are due, else another charge from here on.  Lists
     the groups in which something may happen yet, and returns their number."""
     light, dark, light_factor, dark_factor, extra = of_few
@@ -900,7 +899,7 @@ def note(x: Doubles, words: Words, live: Places, groups: int, of_few: OfFew, spi
 
 
 @njit(inline="always")
-def stays_until(extra: Doubles, i: int, at: int) -> int:
+def stays_until(extra: Floats, i: int, at: int) -> int:
     """The frame in which what comes besides (F, n) to one of few is no longer what it is in frame `at`; F if none."""
     until = at + 1
     while until < extra.shape[0] and extra[until, i] == extra[at, i]:
@@ -954,7 +953,7 @@ def add(values: Bytes, out: Bytes) -> None:
 
 
 @njit(inline="always")
-def couple(kick: float, around: Bytes, charge: Doubles) -> None:
+def couple(kick: float, around: Bytes, charge: Floats) -> None:
     """Charge [grains] with what the neighbours that fired couple in."""
     for j in range(charge.size):
         charge[j] = (charge[j] / _G + kick * around[j]) * _G

@@ -14,9 +14,8 @@ from functools import lru_cache
 
 import numpy as np
 import scipy
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from spikecam_env.types import Floats
 
 DEGREE = 7
 """Enough for an error below 1e-5 of probability from N = 50 on, 2e-5 at N = 20 (tests/sensor/test_fast_quantile)."""
@@ -29,7 +28,7 @@ _USED = 1e-9
 """Probability beyond which the fit is not weighted; the polynomial still rises there."""
 
 
-def charge_cdf(z: Array, electrons: float, kappa: float) -> Array:
+def charge_cdf(z: Floats, electrons: float, kappa: float) -> Floats:
     """P((X - 1) / s <= z) for the law above, z (n,); electrons = inf means no shot noise (a normal law).
 
     Gil-Pelaez: F(z) = 1/2 - (1/pi) integral_0^inf Im(exp(-i w z) phi(w)) / w dw, by trapezia; to 1e-10 for N >= 20.
@@ -46,10 +45,10 @@ def charge_cdf(z: Array, electrons: float, kappa: float) -> Array:
     return np.asarray(0.5 - 0.1 / np.pi * (0.5 * at_zero + integrand.sum(axis=1)))
 
 
-def bell_cdf() -> tuple[Array, Array]:
+def bell_cdf() -> tuple[Floats, Floats]:
     """Where the sum of eight bytes steps, as a number in (-4, 4), and the exact probability of lying below."""
     byte = np.full(256, 1.0 / 256.0)
-    mass: Array = byte
+    mass: Floats = byte
     for _ in range(7):
         mass = np.convolve(mass, byte).astype(np.float64)
     edges = np.arange(1, mass.size + 1, dtype=np.float64) / 256.0 + 3.5 / 256.0 - 4.0

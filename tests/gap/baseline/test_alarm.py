@@ -12,7 +12,7 @@ from small import null, recorded
 from spikecam_env.gap.baseline.alarm import is_discrepant, with_held_out_motion
 from spikecam_env.gap.compare.prediction import Null, values_of
 from spikecam_env.gap.fit.problem import values_to_fit
-from spikecam_env.gap.statistics import Key
+from spikecam_env.gap.statistics import StatisticKey
 
 
 def test_steady_light_held_out_is_not_fitted_since_the_unit_would_be_another():
@@ -38,5 +38,5 @@ def test_the_alarm_depends_on_the_statistics_that_it_is_given_alone():
 @pytest.mark.parametrize("p, alarm", [(0.012, True), (0.033, False)])
 def test_one_campaign_in_fifty_gives_a_false_alarm(p, alarm):
     """Of one statistic whose noise is known, at the normal deviate of a two-sided p."""
-    one = Null((Key("rates", "flat", "level"),), np.zeros(1), np.ones(1), np.zeros(1), 1e9, 1e9)
+    one = Null((StatisticKey("rates", "flat", "level"),), np.zeros(1), np.ones(1), np.zeros(1), 1e9, 1e9)
     assert is_discrepant(one, np.array([stats.norm.isf(p / 2)])) == alarm

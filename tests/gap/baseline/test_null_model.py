@@ -7,7 +7,7 @@ from small import TWINS, null
 
 from spikecam_env.gap.baseline.null_model import with_more_twins
 from spikecam_env.gap.compare.prediction import Draw, Null
-from spikecam_env.gap.statistics import Key
+from spikecam_env.gap.statistics import StatisticKey
 
 
 def test_recordings_in_motion_are_told_by_twice_as_many_twins_and_the_pattern_by_drawn_units():
@@ -22,7 +22,7 @@ def test_recordings_in_motion_are_told_by_twice_as_many_twins_and_the_pattern_by
 
 
 def test_more_campaigns_tell_mean_and_noise_of_what_they_have():
-    both, one = Key("moving", "bars", "delay"), Key("rates", "flat", "level")
+    both, one = StatisticKey("moving", "bars", "delay"), StatisticKey("rates", "flat", "level")
     values = np.random.default_rng(0).standard_normal((36, 2))
     draws = tuple(Draw(n, v, None) for n, v in enumerate(values[:12]))
     few = Null((both, one), values[:12].mean(axis=0), values[:12].std(axis=0, ddof=1), np.zeros(2), 12, 11, draws=draws)

@@ -31,14 +31,16 @@ from spikecam_env.gap.compare.prediction import (
 )
 from spikecam_env.gap.compare.step import slope_of, step_of
 from spikecam_env.gap.settings import Judging
-from spikecam_env.gap.statistics import Key, floor_of
+from spikecam_env.gap.statistics import StatisticKey, floor_of
 
 GATE, HEAVY, TOLERANCE = Judging().gate, Judging().heavy, Judging().tolerance
 
 
 def made_up(mean=0.0, sd=1.0, floor=0.0, twins=12, count=1) -> Null:
     full = lambda v: np.full(count, float(v))  # noqa: E731
-    return Null(tuple(Key("g", "r", str(i)) for i in range(count)), full(mean), full(sd), full(floor), twins, twins - 1)
+    return Null(
+        tuple(StatisticKey("g", "r", str(i)) for i in range(count)), full(mean), full(sd), full(floor), twins, twins - 1
+    )
 
 
 def exactly(mean) -> Prediction:
@@ -79,7 +81,7 @@ def test_an_effect_that_scatters_is_not_held_against_its_own_few_twins(twins, re
     for.  By the null's degrees of freedom the spread of few twins passes for known."""
     rng = np.random.default_rng(twins)
     names = 200 // recordings
-    keys = tuple(Key("drift", f"r{r}", str(i)) for i in range(names) for r in range(recordings))
+    keys = tuple(StatisticKey("drift", f"r{r}", str(i)) for i in range(names) for r in range(recordings))
     with_own, as_the_nulls = 0, 0
     for _ in range(300):
         made = rng.standard_normal((12, 200))
@@ -96,7 +98,7 @@ def test_an_effect_that_scatters_is_not_held_against_its_own_few_twins(twins, re
 
 def test_what_an_effect_leaves_as_it_was_is_known_as_well_as_the_nulls():
     """Twins that scatter as the null's keep its degrees of freedom; one that scatters more takes its group with it."""
-    null = replace(made_up(count=4), keys=tuple(Key("ab"[i > 1], "r", str(i)) for i in range(4)))
+    null = replace(made_up(count=4), keys=tuple(StatisticKey("ab"[i > 1], "r", str(i)) for i in range(4)))
     draws = tuple(Draw(n, np.zeros(4), None) for n in range(3))
     spread = np.array([1.0, 1.0, 1.0, 3.0])
     freedom = freedom_of(null, Prediction(np.zeros(4), np.zeros(4), spread, draws))
@@ -159,7 +161,7 @@ def test_noise_is_of_the_measurement_and_of_the_mean_of_twins():
 
 def test_a_label_within_its_floor_is_no_deviation():
     """Rates are known to 2e-5, whatever the number of spikes."""
-    key = Key("rates", "flat", "level")
+    key = StatisticKey("rates", "flat", "level")
     null = null_of([{key: 1e-9 * n} for n in range(12)], [key])
     assert null.floor[0] == floor_of(key) == 2e-5
     within_floor, beyond = deviates(null, np.array([2e-5]))[0], deviates(null, np.array([2e-4]))[0]
@@ -168,7 +170,7 @@ def test_a_label_within_its_floor_is_no_deviation():
 
 
 def test_null_keeps_statistics_that_all_twins_have():
-    a, b = Key("g", "r", "a"), Key("g", "r", "b")
+    a, b = StatisticKey("g", "r", "a"), StatisticKey("g", "r", "b")
     null = null_of([{a: 1.0, b: 2.0}, {a: 3.0}], [b, a])
     assert null.keys == (a,) and null.mean.tolist() == [2.0] and null.sd[0] == pytest.approx(np.sqrt(2))
     assert np.isnan(values_of({a: 1.0}, [a, b])[1])
@@ -198,7 +200,7 @@ def test_misfit_grows_with_the_logarithm_of_what_is_far_off():
 
 def test_rare_events_widen_a_statistic_and_leave_the_others_alone():
     """Ten statistics of noise alone, ten whose twins scatter five times as much, one of which never moves without."""
-    keys = tuple(Key("quiet" if i < 10 else "rare", f"r{i}", "s") for i in range(20))
+    keys = tuple(StatisticKey("quiet" if i < 10 else "rare", f"r{i}", "s") for i in range(20))
     sd = np.ones(20)
     sd[10] = 0.0
     null = Null(keys, np.zeros(20), sd, np.full(20, 0.1), 12, 11)
@@ -226,7 +228,7 @@ def test_the_noise_of_a_twin_cancels_against_the_nulls_of_the_same_draws():
     assert found.error == pytest.approx(null.sd / np.sqrt(12))
     one = paired(null, made[:1])
     assert one.error**2 == pytest.approx(null.sd**2 / 12 + null.sd**2)
-    rates = replace(null, keys=tuple(Key("rates", "r", str(i)) for i in range(40)))
+    rates = replace(null, keys=tuple(StatisticKey("rates", "r", str(i)) for i in range(40)))
     of_rates = paired(rates, made[:1])
     assert of_rates.error**2 == pytest.approx(null.sd**2 / 12 + (PAIR_NOISE["rates"] * null.sd) ** 2)
 
@@ -273,7 +275,7 @@ def test_far_off_a_step_goes_where_most_point_and_not_where_few_agree_already(ag
 
 
 def test_what_is_chance_in_each_recording_may_be_none_in_all():
-    keys = [Key("intervals", f"r{i}", name) for i in range(9) for name in ("short", "long")]
+    keys = [StatisticKey("intervals", f"r{i}", name) for i in range(9) for name in ("short", "long")]
     z = np.array([2.0 if k.name == "short" else 0.0 for k in keys])
     assert of_all_recordings(keys, z, "intervals") == pytest.approx([6.0, 0.0])
     assert of_all_recordings(keys, z, "noise").size == 0

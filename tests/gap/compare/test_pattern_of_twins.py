@@ -11,9 +11,9 @@ from small import MODEL, effect, recorded, unit
 
 from spikecam_env.gap.compare.prediction import Draw, Null, with_pattern_moved
 from spikecam_env.gap.fit.predict import predict_by_twins
-from spikecam_env.gap.statistics import Key
+from spikecam_env.gap.statistics import StatisticKey
 
-KEYS = (Key("rates", "flat", "slope"), Key("pattern", "flat", "width"))
+KEYS = (StatisticKey("rates", "flat", "slope"), StatisticKey("pattern", "flat", "width"))
 NAN = np.array([np.nan, np.nan])
 WITHOUT = Draw(0, np.array([1.0, 5.0]), None, np.array([np.nan, 7.0]))
 NULL = Null(KEYS, np.array([1.0, 5.5]), np.ones(2), np.zeros(2), 12, 11.0, draws=(WITHOUT,))

@@ -5,10 +5,10 @@ import pytest
 from scipy.special import polygamma
 
 from spikecam_env.gap.compare.pooled_variance import bias, freedom_of_variance, moderated
-from spikecam_env.gap.statistics import Key
+from spikecam_env.gap.statistics import StatisticKey
 
 FREEDOM = 11
-KEYS = [Key("spectrum", f"flat-{r}", f"band {n}") for n in range(8) for r in range(10)]
+KEYS = [StatisticKey("spectrum", f"flat-{r}", f"band {n}") for n in range(8) for r in range(10)]
 
 
 def drawn(true, seed):
@@ -48,7 +48,7 @@ def test_what_differs_keeps_its_own():
 @pytest.mark.parametrize("apart", [0.2, 0.5, 1.0])
 def test_what_is_said_of_a_variance_is_as_sure_as_it_says(apart, of_recording):
     """The logarithm's error is that of a sample variance with the degrees of freedom stated."""
-    keys = [Key("spectrum", f"flat-{r}", f"band {n}") for n in range(50) for r in range(40)]
+    keys = [StatisticKey("spectrum", f"flat-{r}", f"band {n}") for n in range(50) for r in range(40)]
     rng = np.random.default_rng(3)
     true = np.exp(apart * rng.standard_normal(len(keys)) + np.tile(of_recording * rng.standard_normal(40), 50))
     found, freedom = moderated(keys, drawn(true, 4), FREEDOM)
@@ -66,7 +66,7 @@ def test_a_variance_far_below_its_like_is_chance():
 
 def test_few_variances_make_each_other_no_surer_than_they_are():
     """Of six recordings of one kind: the error of what they say together is part of it."""
-    keys, rng = [Key("spectrum", f"flat-{r}", "band 0") for r in range(6)], np.random.default_rng(8)
+    keys, rng = [StatisticKey("spectrum", f"flat-{r}", "band 0") for r in range(6)], np.random.default_rng(8)
     found = [moderated(keys, rng.chisquare(FREEDOM, len(keys)) / FREEDOM, FREEDOM) for _ in range(400)]
     error2 = np.mean([np.log(v) ** 2 for v, _ in found])
     stated = np.mean([polygamma(1, f / 2) for _, f in found])
@@ -74,7 +74,7 @@ def test_few_variances_make_each_other_no_surer_than_they_are():
 
 
 def test_what_stands_alone_or_never_varies_is_left():
-    keys = [*KEYS, Key("step", "step", "undershoot"), Key("spectrum", "dark", "band 0")]
+    keys = [*KEYS, StatisticKey("step", "step", "undershoot"), StatisticKey("spectrum", "dark", "band 0")]
     made = np.append(drawn(np.ones(len(KEYS)), 6), [7.0, 0.0])
     found, freedom = moderated(keys, made, FREEDOM)
     assert list(found[-2:]) == [7.0, 0.0] and list(freedom[-2:]) == [FREEDOM, FREEDOM]

@@ -12,7 +12,7 @@ from spikecam_env.gap.candidates.strength import with_effect
 from spikecam_env.gap.compare.prediction import Draw, Null, Prediction
 from spikecam_env.gap.fit.gauss_newton import WHITE, Probe, derivative_step, derivatives, descend, prior_sd
 from spikecam_env.gap.fit.problem import Problem
-from spikecam_env.gap.statistics import Key
+from spikecam_env.gap.statistics import StatisticKey
 from spikecam_env.gap.unit.refit import BaseFit
 from spikecam_env.sensor import SensorModel
 
@@ -25,7 +25,7 @@ FREE = [(NAME, key) for key in TRUE]
 def null() -> Null:
     values = np.random.default_rng(0).standard_normal((TWINS, COUNT))
     draws = tuple(Draw(n, v, None) for n, v in enumerate(values))
-    keys = tuple(Key("rates", "r", str(i)) for i in range(COUNT))
+    keys = tuple(StatisticKey("rates", "r", str(i)) for i in range(COUNT))
     return Null(keys, values.mean(axis=0), values.std(axis=0, ddof=1), np.zeros(COUNT), TWINS, TWINS - 1, draws=draws)
 
 

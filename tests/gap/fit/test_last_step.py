@@ -18,7 +18,7 @@ from spikecam_env.gap.fit.problem import Problem
 from spikecam_env.gap.result import Estimate
 from spikecam_env.gap.search.forward import joined
 from spikecam_env.gap.search.round import Round
-from spikecam_env.gap.statistics import Key
+from spikecam_env.gap.statistics import StatisticKey
 from spikecam_env.gap.twins.budget import Budget
 
 TRUE = {"fraction": 0.02, "tau_us": 300.0}
@@ -55,7 +55,7 @@ def campaign(seed: int, limit: float, true: float = TRUE["fraction"]) -> ByLaw:
     """Of statistics of noise 1, whose null model is known from TWINS draws."""
     rng = np.random.default_rng(seed)
     values = rng.standard_normal((TWINS, COUNT))
-    keys = tuple(Key("rates", "r", str(i)) for i in range(COUNT))
+    keys = tuple(StatisticKey("rates", "r", str(i)) for i in range(COUNT))
     draws = tuple(Draw(n, v, None) for n, v in enumerate(values))
     null = Null(keys, values.mean(axis=0), np.ones(COUNT), np.full(COUNT, 1e-9), TWINS, TWINS - 1, draws=draws)
     measured = law(with_reset(true)) + rng.standard_normal(COUNT)

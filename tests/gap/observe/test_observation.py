@@ -15,7 +15,7 @@ from spikecam_env.gap.observe.observation import (
     FRAME_LAGS,
     LENGTHS,
     TIME_BLOCKS,
-    Observation,
+    ObservedRecording,
     observe,
 )
 from spikecam_env.streams import pack_frames
@@ -224,5 +224,5 @@ def test_an_empty_and_a_full_stream():
 @pytest.mark.parametrize("share, few", [(0.2, True), (0.45, False)])
 def test_pixels_with_irregular_intervals_count_as_few_up_to_three_tenths(share, few):
     short = (np.arange(1000) < 1000 * share).astype(np.int64)
-    found = Observation.irregular.fget(SimpleNamespace(short=short, long=np.zeros(1000, np.int64)))
+    found = ObservedRecording.irregular.fget(SimpleNamespace(short=short, long=np.zeros(1000, np.int64)))
     assert found.sum() == (1000 * share if few else 0)

@@ -22,7 +22,7 @@ from spikecam_env.gap.report.exhibits import Exhibit, by_z, exhibits
 from spikecam_env.gap.report.exhibits.spectrum import averaged, panels
 from spikecam_env.gap.report.exhibits.step import free_window
 from spikecam_env.gap.report.page import report, write_report
-from spikecam_env.gap.report.panels import Panel
+from spikecam_env.gap.report.panels import PlotPanel
 from spikecam_env.gap.report.plots import strip
 from spikecam_env.gap.report.quantities import at_most
 from spikecam_env.gap.report.reproduce import MADE_BY, command_of
@@ -273,7 +273,9 @@ def test_numbers_under_a_panel_of_names_do_not_touch() -> None:
     """Correlations of -0.51 that differ in the fourth digit."""
     x = np.arange(2.0)
     values = np.array([-0.5128, -0.5127])
-    figure = plots.panel(Panel("", "", "[1]", x, values, values, None, np.full(2, 1.5e-4), labels=("wall", "held out")))
+    figure = plots.panel(
+        PlotPanel("", "", "[1]", x, values, values, None, np.full(2, 1.5e-4), labels=("wall", "held out"))
+    )
     renderer = FigureCanvasAgg(figure).get_renderer()
     figure.draw(renderer)
     low, high = figure.axes[0].get_xlim()

@@ -20,7 +20,7 @@ from spikecam_env.gap.screen.templates import FILE, SEVERE, save_templates, ship
 from spikecam_env.gap.search.neighbours import other_starts
 from spikecam_env.gap.search.shortlist import groups_that_stand_out, starts_to_fit
 from spikecam_env.gap.settings import Searching
-from spikecam_env.gap.statistics import Key
+from spikecam_env.gap.statistics import StatisticKey
 from spikecam_env.sensor import CATALOGUE
 
 
@@ -76,7 +76,11 @@ def test_where_motion_stands_out_all_that_shows_by_it_is_tried_in_every_shape():
 
 def test_what_stands_out_most_is_loud_however_quiet_it_is():
     """An alarm raised by motion alone, at 5.5 noises, was never put to blooming."""
-    keys = (Key("rates", "flat", "slope"), Key("moving", "bars", "bloom"), Key("step", "step", "down 1-2"))
+    keys = (
+        StatisticKey("rates", "flat", "slope"),
+        StatisticKey("moving", "bars", "bloom"),
+        StatisticKey("step", "step", "down 1-2"),
+    )
     null = Null(keys, np.zeros(3), np.ones(3), np.ones(3), 12, 11.0)
     assert groups_that_stand_out(null, np.array([5.0, -5.5, 1.0])) == {"moving"}
     assert groups_that_stand_out(null, np.array([5.0, -5.5, 7.0])) == {"step"}
@@ -115,6 +119,6 @@ def test_the_template_of_crosstalk_is_of_its_neighbours_and_not_of_a_unit_too_br
     peak = {
         group: np.abs(shift[[k.group == group for k in templates.keys]]).max() for group in ("neighbours", "moving")
     }
-    [level] = [shift[i] for i, k in enumerate(templates.keys) if k == Key("moving", "bars", "level")]
+    [level] = [shift[i] for i, k in enumerate(templates.keys) if k == StatisticKey("moving", "bars", "level")]
     print(peak, level)
     assert abs(level) < 0.5 * peak["neighbours"]

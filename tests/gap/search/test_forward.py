@@ -22,7 +22,7 @@ from spikecam_env.gap.search.neighbours import runner_up, try_in_place_of_earlie
 from spikecam_env.gap.search.rivals import is_rival, lead
 from spikecam_env.gap.search.round import Round, has_candidate, is_improvement, is_visible
 from spikecam_env.gap.settings import PER_PARAMETER, Deviance, DiagnosisSettings, Searching
-from spikecam_env.gap.statistics import Key
+from spikecam_env.gap.statistics import StatisticKey
 from spikecam_env.gap.twins.budget import Budget
 from spikecam_env.gap.unit.conversion import exact_refit
 from spikecam_env.gap.unit.refit import BaseFit
@@ -56,7 +56,7 @@ class OfAll:
 def null() -> Null:
     values = np.random.default_rng(0).standard_normal((TWINS, COUNT))
     draws = tuple(Draw(n, v, None) for n, v in enumerate(values))
-    keys = tuple(Key("rates", "r", str(i)) for i in range(COUNT))
+    keys = tuple(StatisticKey("rates", "r", str(i)) for i in range(COUNT))
     return Null(keys, values.mean(axis=0), values.std(axis=0, ddof=1), np.zeros(COUNT), TWINS, TWINS - 1, draws=draws)
 
 

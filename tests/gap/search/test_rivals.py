@@ -10,7 +10,7 @@ from spikecam_env.gap.compare.distance import residual_and_misfit
 from spikecam_env.gap.compare.prediction import Draw, Null, Prediction
 from spikecam_env.gap.search.rivals import is_rival, lead
 from spikecam_env.gap.settings import Deviance
-from spikecam_env.gap.statistics import Key
+from spikecam_env.gap.statistics import StatisticKey
 
 TIE = Deviance().tie
 
@@ -19,7 +19,7 @@ COUNT, TWINS = 200, 12
 
 def null(seed: int) -> Null:
     values = np.random.default_rng(seed).standard_normal((TWINS, COUNT))
-    keys = tuple(Key("rates", "r", str(i)) for i in range(COUNT))
+    keys = tuple(StatisticKey("rates", "r", str(i)) for i in range(COUNT))
     draws = tuple(Draw(n, v, None) for n, v in enumerate(values))
     return Null(keys, values.mean(axis=0), values.std(axis=0, ddof=1), np.zeros(COUNT), TWINS, TWINS - 1, draws=draws)
 

@@ -13,9 +13,9 @@ from spikecam_env.gap.fit.candidate import Fit
 from spikecam_env.gap.search.neighbours import runner_up
 from spikecam_env.gap.search.round import Round, absent, is_small_share, is_visible
 from spikecam_env.gap.settings import Searching
-from spikecam_env.gap.statistics import Key
+from spikecam_env.gap.statistics import StatisticKey
 
-KEYS = tuple(Key("rates", "r", str(i)) for i in range(10))
+KEYS = tuple(StatisticKey("rates", "r", str(i)) for i in range(10))
 NULL = Null(KEYS, np.zeros(10), np.ones(10), np.zeros(10), 1_000_000, 11.0)
 NOTHING = Prediction(np.zeros(10), np.zeros(10), np.ones(10))
 PIXELS = SHAPE[0] * SHAPE[1]

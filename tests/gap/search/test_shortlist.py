@@ -9,7 +9,7 @@ from spikecam_env.gap.compare.prediction import Null
 from spikecam_env.gap.screen.screen import Screened
 from spikecam_env.gap.search.shortlist import groups_that_stand_out, starts_to_fit
 from spikecam_env.gap.settings import Searching
-from spikecam_env.gap.statistics import Key
+from spikecam_env.gap.statistics import StatisticKey
 
 NAMES = ("dead_time", "ir_drop", "crosstalk", "readout_skew", "optical_blur", "missed_spikes", "comparator_delay")
 
@@ -26,6 +26,6 @@ def test_three_are_fitted_at_least_and_five_at_most(others: float, count: int):
 
 @pytest.mark.parametrize("noises, groups", [(4.0, {"rates"}), (9.0, {"rates", "pattern"})])
 def test_a_statistic_stands_out_from_six_noises(noises: float, groups: set[str]):
-    keys = (Key("rates", "r", "slope"), Key("pattern", "r", "rows"))
+    keys = (StatisticKey("rates", "r", "slope"), StatisticKey("pattern", "r", "rows"))
     null = Null(keys, np.zeros(2), np.ones(2), np.zeros(2), 12, 11.0)
     assert groups_that_stand_out(null, np.array([20.0, -noises])) == groups

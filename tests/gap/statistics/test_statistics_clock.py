@@ -9,7 +9,7 @@ import pytest
 
 from spikecam_env.calibration.real import ideal_second_difference
 from spikecam_env.gap.observe.observation import DIFFERENCES
-from spikecam_env.gap.statistics import Key, floor_of
+from spikecam_env.gap.statistics import StatisticKey, floor_of
 from spikecam_env.gap.statistics.clock import bands, statistics
 from spikecam_env.gap.statistics.reading import root
 
@@ -79,4 +79,4 @@ def test_late_and_early_spikes_are_those_of_their_rows():
 
 @pytest.mark.parametrize("name", ["whole 0", "late 3", "early 9"])
 def test_counts_are_exact_to_their_own_chance(name):
-    assert floor_of(Key("clock", "wall", name)) == 1.0
+    assert floor_of(StatisticKey("clock", "wall", name)) == 1.0

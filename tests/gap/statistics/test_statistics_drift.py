@@ -9,7 +9,7 @@ import pytest
 from small import CLEAR, check_reveals, effect, recorded, seen
 
 from spikecam_env.gap.observe.observation import observe
-from spikecam_env.gap.statistics import Key
+from spikecam_env.gap.statistics import StatisticKey
 from spikecam_env.gap.statistics.drift import CONSTANCY, PARTS, lateness
 from spikecam_env.streams import pack_frames
 
@@ -62,7 +62,7 @@ def test_few_intervals_tell_nothing():
 def test_what_all_pixels_do_is_no_variance_within_a_pixel():
     drifting = seen(recorded(effect("lamp_drift", sigma_per_root_s=0.3)))
     for flat in ("flat-0.2", "flat-0.65"):
-        trend, pixels = (drifting[Key("drift", flat, name)] for name in ("trend", "pixels"))
+        trend, pixels = (drifting[StatisticKey("drift", flat, name)] for name in ("trend", "pixels"))
         print(f"{flat}: trend {trend:.0f}, pixels {pixels:.1f}")
         assert abs(trend) > 2 * CLEAR
         assert abs(pixels) < CLEAR

@@ -7,7 +7,7 @@ import pytest
 from scipy import stats
 from small import CLEAR, FRAMES, MODEL, SHAPE, conditions, effect, quiet, recorded
 
-from spikecam_env.gap.statistics import Key, floor_of, pattern
+from spikecam_env.gap.statistics import StatisticKey, floor_of, pattern
 from spikecam_env.gap.twins.fresh_units import drawn_banks
 from spikecam_env.gap.unit.refit import BaseFit
 from spikecam_env.sensor import SensorModel
@@ -24,7 +24,7 @@ CASES = [
 ]
 
 
-def deviates_from_units(case) -> dict[Key, float]:
+def deviates_from_units(case) -> dict[StatisticKey, float]:
     """Every pattern statistic against units drawn from the model, Student's t of DRAWS made normal."""
     banks = drawn_banks(MODEL, case.base, case.conditions, case.shape, DRAWS, 11, (0.6, 1.67))
     found = {}
@@ -39,7 +39,7 @@ def deviates_from_units(case) -> dict[Key, float]:
 @pytest.mark.parametrize("shown_by, where, name, silent", CASES, ids=lambda v: getattr(v, "name", None))
 def test_pattern_reveals(shown_by, where, name, silent):
     z, clean = deviates_from_units(recorded(shown_by)), deviates_from_units(recorded(seed=5))
-    key = Key("pattern", where, name)
+    key = StatisticKey("pattern", where, name)
     print(f"{where} {name} {z[key]:.1f}, without {clean[key]:.1f}")
     assert abs(z[key]) > CLEAR and abs(clean[key]) < quiet(1)
     if silent:
@@ -86,7 +86,7 @@ def test_pixels_that_fire_once_or_twice_in_the_dark_differ_though_they_are_all_a
     one = np.ones(SHAPE[0] * SHAPE[1])
     base = BaseFit(one, 1.6 / FRAMES * one, 0 * one, 0 * one, 0.0, np.zeros((0, one.size)), one > 0)
     banks = drawn_banks(model, base, dark, SHAPE, 4, 0, (0.6, 1.67))
-    widths = [np.exp(b[Key("pattern", "dark", "width")]) for b in banks]
+    widths = [np.exp(b[StatisticKey("pattern", "dark", "width")]) for b in banks]
     assert widths == pytest.approx(4 * [0.3 / 1.6], rel=0.1)
 
 

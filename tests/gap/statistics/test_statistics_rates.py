@@ -7,7 +7,7 @@ from dataclasses import replace
 import pytest
 from small import CLEAR, SHAPE, case_from, check_reveals, conditions, effect, seen, spikes_of
 
-from spikecam_env.gap.statistics import Key
+from spikecam_env.gap.statistics import StatisticKey
 from spikecam_env.sensor import Keyframes
 
 CASES = [
@@ -47,7 +47,9 @@ def test_what_bends_a_quarter_of_the_array_shows_in_its_corner():
         spikes[:, :rows, :columns] = bent[name][:, :rows, :columns]
     case = case_from(plain)
     z, value = seen(case), case.bank
-    corners = [Key("rates", "flat-0.65", f"{side} corner") for side in ("top-left", "top-right", "bottom-left")]
+    corners = [
+        StatisticKey("rates", "flat-0.65", f"{side} corner") for side in ("top-left", "top-right", "bottom-left")
+    ]
     print({k.name: (f"{value[k]:.1e}", round(z[k], 1)) for k in corners})
     assert min(abs(z[k]) for k in corners) > CLEAR
     for other in corners[1:]:

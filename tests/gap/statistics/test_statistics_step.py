@@ -12,7 +12,7 @@ from small import FRAMES, check_reveals, conditions, effect, null, recorded
 
 from spikecam_env.gap.observe.conditions import Condition
 from spikecam_env.gap.observe.observation import observe
-from spikecam_env.gap.statistics import Key
+from spikecam_env.gap.statistics import StatisticKey
 from spikecam_env.gap.statistics.step import edges_of, statistics, uniform_light
 from spikecam_env.sensor import Keyframes, SpikeSensor
 from spikecam_env.streams import pack_frames
@@ -38,7 +38,7 @@ def test_lag_takes_light_after_an_edge_up_and_gives_it_back_after_one_down():
     f, tau = 0.06, 40.0
     case = recorded(effect("photodiode_lag", fraction=f, tau_us=tau * 25))
     law = f * tau * (np.exp(-16 / tau) - np.exp(-32 / tau))
-    up, down = (case.bank[Key("step", "step", f"{way} 16-32")] for way in ("up", "down"))
+    up, down = (case.bank[StatisticKey("step", "step", f"{way} 16-32")] for way in ("up", "down"))
     noise = {k.name: s for k, s in zip(null().keys, null().noise, strict=True) if k.group == "step"}["up 16-32"]
     print(f"up {up:.3f}, down {down:.3f}, law {law:.3f}, noise {noise:.3f}")
     for value in (-up, down):

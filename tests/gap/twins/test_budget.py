@@ -26,7 +26,7 @@ from spikecam_env.gap.search.neighbours import may_try_without_earlier, try_canc
 from spikecam_env.gap.search.round import Round
 from spikecam_env.gap.search.shortlist import may_be_shaped
 from spikecam_env.gap.settings import DiagnosisSettings
-from spikecam_env.gap.statistics import Key
+from spikecam_env.gap.statistics import StatisticKey
 from spikecam_env.gap.twins.budget import CAMPAIGNS, Budget
 from spikecam_env.gap.verdict.comparison import Comparison
 from spikecam_env.gap.verdict.verdict import conclude
@@ -176,7 +176,7 @@ def test_what_is_not_simulated_together_is_judged_by_the_model_given(monkeypatch
     monkeypatch.setattr(searching, "simulated_for", lambda *_: ([0], 1))
     monkeypatch.setattr(searching, "stepped_once", lambda problem, found, names: (found, {}))
     monkeypatch.setattr(searching, "with_errors", lambda turn, errors: turn)
-    keys = tuple(Key("g", "r", str(i)) for i in range(3))
+    keys = tuple(StatisticKey("g", "r", str(i)) for i in range(3))
     null = Null(keys, np.zeros(3), np.ones(3), np.full(3, 0.1), 12, 11.0)
     both = Prediction(np.ones(3), np.full(3, 0.3), np.full(3, 2.0), ())
     model = SimpleNamespace(effects=(SimpleNamespace(name="lamp_drift"), SimpleNamespace(name="blooming")))

@@ -7,7 +7,7 @@ import pytest
 from small import MODEL, SHAPE, effect, recorded, unit
 
 from spikecam_env.gap.settings import UnitSettings
-from spikecam_env.gap.statistics import Key
+from spikecam_env.gap.statistics import StatisticKey
 from spikecam_env.gap.twins.case import twins
 from spikecam_env.gap.twins.fresh_units import drawn_banks
 from spikecam_env.gap.unit.conversion import unit_from_refit
@@ -71,7 +71,7 @@ def test_twins_of_a_refitted_camera_have_as_many_bright_pixels_as_it():
 
 def test_a_model_with_traps_predicts_their_bright_tail():
     case = recorded(SEVERE)
-    key = Key("pattern", "dark", "high tail")
+    key = StatisticKey("pattern", "dark", "high tail")
     plain, trapped = (
         [b[key] for b in drawn_banks(m, case.base, case.conditions, SHAPE, 12, 0, LIMITS)] for m in (MODEL, TRAPPED)
     )

@@ -10,13 +10,13 @@ import pytest
 from spikecam_env.gap.compare.distance import robust_squares
 from spikecam_env.gap.compare.prediction import Null, Prediction
 from spikecam_env.gap.settings import Judging
-from spikecam_env.gap.statistics import Key
+from spikecam_env.gap.statistics import StatisticKey
 from spikecam_env.gap.verdict.remainder import explains, remainder_of
 
 HEAVY, TOLERANCE = Judging().heavy, Judging().tolerance
 
 PLACES = ("pattern flat", "rates flat", "rates dark", "drift dark")
-KEYS = tuple(Key(*place.split(), str(n)) for place in PLACES for n in range(25))
+KEYS = tuple(StatisticKey(*place.split(), str(n)) for place in PLACES for n in range(25))
 COUNT = len(KEYS)
 NULL = Null(KEYS, np.zeros(COUNT), np.ones(COUNT), np.zeros(COUNT), 10**6, 10**6)
 

@@ -9,7 +9,7 @@ import pytest
 
 from spikecam_env.gap.compare.prediction import Null
 from spikecam_env.gap.report.meaning import _STRUCTURE
-from spikecam_env.gap.statistics import Key
+from spikecam_env.gap.statistics import StatisticKey
 from spikecam_env.gap.verdict import structure as module
 from spikecam_env.gap.verdict.structure import level_exponent, structure
 
@@ -20,7 +20,7 @@ def test_of_statistics_seen_on_as_many_flats_the_first_gives_the_exponent() -> N
     """Statistic n goes with level^n; any but the first would give another exponent.  Eight, so that an order of chance
     (of a set of names, another in every process) would pass once in eight."""
     names = [f"statistic {n}" for n in range(8)]
-    keys = tuple(Key("rates", flat, name) for name in names for flat in LEVELS)
+    keys = tuple(StatisticKey("rates", flat, name) for name in names for flat in LEVELS)
     ones = np.ones(len(keys))
     null = Null(keys, 0 * ones, ones, 0 * ones, np.inf, 100.0)
     for first in range(8):
@@ -33,7 +33,7 @@ def test_of_statistics_seen_on_as_many_flats_the_first_gives_the_exponent() -> N
 
 def made_up(off: dict[tuple[str, str], float]) -> tuple[Null, np.ndarray]:
     """Statistics off by so many noises, by (group, recording)."""
-    keys = tuple(Key(group, recording, "mean") for group, recording in off)
+    keys = tuple(StatisticKey(group, recording, "mean") for group, recording in off)
     ones = np.ones(len(keys))
     return Null(keys, 0 * ones, ones, 0 * ones, np.inf, 100.0), np.array(list(off.values()))
 

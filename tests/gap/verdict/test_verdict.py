@@ -11,16 +11,20 @@ import pytest
 from spikecam_env.gap.baseline.off_nominal import OffNominal
 from spikecam_env.gap.compare.prediction import Null
 from spikecam_env.gap.result import Gap, Remainder
-from spikecam_env.gap.statistics import Key
+from spikecam_env.gap.statistics import StatisticKey
 from spikecam_env.gap.verdict.comparison import Comparison, aligned_mean
 from spikecam_env.gap.verdict.notes import Note, gap_is_fitted, notes_of
 from spikecam_env.gap.verdict.verdict import may_be_chance, verdict_of
 
 COUNT = 100
 NULL = Null(
-    tuple(Key("rates", "flat", f"{n}") for n in range(COUNT)), np.zeros(COUNT), np.ones(COUNT), np.zeros(COUNT), 10**6,
+    tuple(StatisticKey("rates", "flat", f"{n}") for n in range(COUNT)),
+    np.zeros(COUNT),
+    np.ones(COUNT),
+    np.zeros(COUNT),
     10**6,
-)  # fmt: skip
+    10**6,
+)
 
 
 def comparison(**others) -> Comparison:

@@ -18,11 +18,11 @@ from scenes.renderers import choose
 from scenes.renderers.choose import BACKENDS, choose_renderer
 from scenes.renderers.embree import Embree
 from scenes.renderers.opengl import OpenGL
-from scenes.renderers.protocol import Lighting, Pinhole, Renderer, Sprite, Surface, Window
+from scenes.renderers.protocol import Lighting, PictureWindow, Pinhole, Renderer, Sprite, Surface
 from spikecam_env.bench.renderers import compare_backends, objects
 from spikecam_env.errors import InputError, NotReadyError
 
-WINDOW = Window(0, 0, 60, 80)
+WINDOW = PictureWindow(0, 0, 60, 80)
 EYE = np.eye(4)
 EYE[2, 3] = 3.2
 CAMERA = Pinhole(70.0, (39.5, 29.5), EYE)
@@ -187,7 +187,7 @@ def test_a_driver_that_crashes_or_hangs_is_left_out(
 
 def test_opengl_targets_grow_to_the_largest_window(opengl: OpenGL) -> None:
     surface = ball()
-    small, large = Window(20, 30, 8, 20), Window(0, 0, 60, 80)
+    small, large = PictureWindow(20, 30, 8, 20), PictureWindow(0, 0, 60, 80)
     first = opengl.render(surface, np.eye(4), CAMERA, Lighting(), small, 8)
     opengl.render(surface, np.eye(4), CAMERA, Lighting(), large, 8)
     again = opengl.render(surface, np.eye(4), CAMERA, Lighting(), small, 8)

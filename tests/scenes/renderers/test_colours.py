@@ -6,10 +6,10 @@ import numpy as np
 import trimesh
 
 from scenes.meshes import from_mesh
-from scenes.renderers.protocol import Lighting, Pinhole, Renderer, Surface, Window
+from scenes.renderers.protocol import Lighting, PictureWindow, Pinhole, Renderer, Surface
 from scenes.transfer import grey, linear_from_srgb
 
-WINDOW = Window(0, 0, 40, 60)
+WINDOW = PictureWindow(0, 0, 40, 60)
 EYE = np.eye(4)
 EYE[2, 3] = 3.0
 CAMERA = Pinhole(60.0, (29.5, 19.5), EYE)

@@ -6,10 +6,11 @@ import numpy as np
 import pytest
 import trimesh
 
-from scenes.renderers.protocol import Array, Lighting, Pinhole, Renderer, Sprite, Surface, Window
+from scenes.renderers.protocol import Lighting, PictureWindow, Pinhole, Renderer, Sprite, Surface
 from spikecam_env.errors import InputError
+from spikecam_env.types import Pictures
 
-PICTURE = Window(0, 0, 90, 120)
+PICTURE = PictureWindow(0, 0, 90, 120)
 FOCAL, CENTRE = 150.0, (59.5, 44.5)
 CAMERA = Pinhole(FOCAL, CENTRE, np.eye(4))
 AMBIENT_ONLY = Lighting(ambient=1.0, intensity=0.0)
@@ -182,7 +183,7 @@ def test_texture_is_upright_and_unsheared_at_any_width(renderer: Renderer, shape
     rows, columns = shape
     texel = 9
     camera = Pinhole(100.0, ((columns * texel - 1) / 2, (rows * texel - 1) / 2), np.eye(4))
-    window = Window(0, 0, rows * texel, columns * texel)
+    window = PictureWindow(0, 0, rows * texel, columns * texel)
     surface = Surface(card(columns * texel / 100, rows * texel / 100), texture)
     sprite = renderer.render(surface, at(0, 0, -1), camera, AMBIENT_ONLY, window, supersample=1)
     centres = sprite.radiance[texel // 2 :: texel, texel // 2 :: texel]
@@ -202,10 +203,12 @@ def test_texture_finer_than_the_rays_is_its_mean_and_does_not_alias(renderer: Re
     assert rms(inside - 0.5) < 1e-5
 
 
-@pytest.mark.parametrize("window", [Window(-20, -30, 60, 70), Window(70, 100, 50, 60), Window(20, 35, 1, 1)])
-def test_a_window_is_a_cut_of_the_plane_also_outside_the_picture(renderer: Renderer, window: Window) -> None:
+@pytest.mark.parametrize(
+    "window", [PictureWindow(-20, -30, 60, 70), PictureWindow(70, 100, 50, 60), PictureWindow(20, 35, 1, 1)]
+)
+def test_a_window_is_a_cut_of_the_plane_also_outside_the_picture(renderer: Renderer, window: PictureWindow) -> None:
     surface = Surface(trimesh.creation.icosphere(3, 2.0), 0.7)
-    wide = Window(-40, -40, 170, 200)
+    wide = PictureWindow(-40, -40, 170, 200)
     whole, part = (renderer.render(surface, at(0.2, 0, -5), CAMERA, Lighting(), w) for w in (wide, window))
     cut = np.s_[window.top + 40 : window.top + 40 + window.rows, window.left + 40 : window.left + 40 + window.columns]
     different = np.count_nonzero(np.abs(part.coverage - whole.coverage[cut]) > 1e-6)
@@ -232,12 +235,12 @@ def test_a_floor_that_passes_below_the_camera_is_seen_to_its_horizon(renderer: R
 
 
 def test_nonsense_is_refused_with_the_fix(renderer: Renderer) -> None:
-    texture: Array = np.ones((4, 4), np.float32)
+    texture: Pictures = np.ones((4, 4), np.float32)
     bare = disc(1)
     empty = trimesh.Trimesh(np.zeros((0, 3)), np.zeros((0, 3), int))
     colour = np.ones((4, 4, 3), np.float32)
 
-    def render(surface: Surface, window: Window = PICTURE, supersample: int = 2, turn: float = 1.0) -> None:
+    def render(surface: Surface, window: PictureWindow = PICTURE, supersample: int = 2, turn: float = 1.0) -> None:
         renderer.render(surface, turn * np.eye(4), CAMERA, Lighting(), window, supersample)
 
     with pytest.raises(InputError, match=r"TextureVisuals\(uv"):
@@ -247,7 +250,7 @@ def test_nonsense_is_refused_with_the_fix(renderer: Renderer) -> None:
     with pytest.raises(InputError, match=r"\(4, 4, 3\)"):
         render(Surface(card(1, 1), colour))
     with pytest.raises(InputError, match="0 rows"):
-        render(Surface(bare), Window(0, 0, 0, 5))
+        render(Surface(bare), PictureWindow(0, 0, 0, 5))
     with pytest.raises(InputError, match="supersample is 0"):
         render(Surface(bare), supersample=0)
     with pytest.raises(InputError, match="inverted"):

@@ -12,7 +12,7 @@ import pytest
 from laws import check, check_mean
 
 from spikecam_env.sensor import CATALOGUE, SensorModel
-from spikecam_env.sensor.effects.base import Charge, Exposure
+from spikecam_env.sensor.effects.base import Charge, ExposureBlock
 from spikecam_env.sensor.effects.random_telegraph_noise import TICKS, share_in_upper
 from spikecam_env.sensor.frame_moments import decay_moment
 
@@ -20,7 +20,7 @@ FRAMES, FINE = 24, 1000
 RATE_HZ = 40_000.0
 TIME = (np.arange(FRAMES * FINE) + 0.5) / FINE
 """Instants [frames]."""
-FIRST = Exposure(0, RATE_HZ, (1, 3), SensorModel.preset("ideal").draw_unit((1, 3), 0))
+FIRST = ExposureBlock(0, RATE_HZ, (1, 3), SensorModel.preset("ideal").draw_unit((1, 3), 0))
 
 
 def ends() -> np.ndarray:
@@ -153,7 +153,7 @@ def test_lamp_drift_is_the_mean_of_its_walk() -> None:
 def telegraph(dwell: float, traps: int, frames: int, cuts: int) -> np.ndarray:
     """(frames, traps) share of the frame in the upper state."""
     shape = (1, traps)
-    first = Exposure(0, RATE_HZ, shape, SensorModel.preset("ideal").draw_unit(shape, 0))
+    first = ExposureBlock(0, RATE_HZ, shape, SensorModel.preset("ideal").draw_unit(shape, 0))
     effect = CATALOGUE["random_telegraph_noise"](amplitude_pA=30.0, fraction=1.0, dwell_ms=dwell * 1e3 / RATE_HZ)
     memory = effect.begin(first, np.random.default_rng(1), np.random.default_rng(2))
     parts, nothing = [], Charge(np.zeros((1, *shape)))

@@ -16,7 +16,7 @@ from laws import camera, population, with_effects
 from spikecam_env.errors import InputError
 from spikecam_env.sensor import CATALOGUE, Keyframes, SensorModel, SpikeSensor
 from spikecam_env.sensor.effect_sheet import SECTIONS, Sheet
-from spikecam_env.sensor.effects.base import Charge, Exposure, Few
+from spikecam_env.sensor.effects.base import Charge, ExposureBlock, Few
 from spikecam_env.sensor.kernels import block
 from tools import effects_page
 
@@ -114,7 +114,7 @@ def fits(array: np.ndarray, shape: tuple[int, ...]) -> bool:
 @pytest.mark.parametrize("name", [n for n in EVERY if not CATALOGUE[n].is_fixed()])
 def test_hooks_change_nothing_in_place_and_keep_shapes(name: str) -> None:
     effect, rng = strong(name), np.random.default_rng(0)
-    first = Exposure(0, 40_000.0, SHAPE, SensorModel.preset("scsim").draw_unit(SHAPE, 0))
+    first = ExposureBlock(0, 40_000.0, SHAPE, SensorModel.preset("scsim").draw_unit(SHAPE, 0))
     memory = frozen(effect.begin(first, np.random.default_rng(1), np.random.default_rng(2)))
     number = 0
     for frames in (1, 1, 4, 1, 7):

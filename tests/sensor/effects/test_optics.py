@@ -8,7 +8,7 @@ from laws import camera, check, population, rates
 from scipy.special import erf
 
 from spikecam_env.sensor import CATALOGUE, Keyframes, SensorModel, SpikeSensor
-from spikecam_env.sensor.effects.base import Charge, Exposure
+from spikecam_env.sensor.effects.base import Charge, ExposureBlock
 
 
 def test_light_flicker_has_its_amplitude_at_its_frequency_and_none_in_the_dark() -> None:
@@ -26,7 +26,7 @@ def test_lamp_drift_is_a_random_walk_of_variance_sigma_squared_t() -> None:
     """Increments of n frames have variance sigma^2 n / frame rate: 4.5 sqrt(2 / increments) of it."""
     effect, frames, n = CATALOGUE["lamp_drift"](sigma_per_root_s=0.1), 40_000, 10
     unit = SensorModel.preset("ideal").draw_unit((1, 1), 0)
-    now = Exposure(0, 40_000.0, (1, 1), unit, frames)
+    now = ExposureBlock(0, 40_000.0, (1, 1), unit, frames)
     memory = effect.begin(now, np.random.default_rng(0), np.random.default_rng(1))
     light, dark, _ = effect.collect(Charge(np.ones((1, 1, 1))), Charge(np.zeros((1, 1, 1))), now, memory)
     path = light.values.ravel()

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from spikecam_env.sensor import CATALOGUE, Keyframes, SensorModel, SpikeSensor, drive
-from spikecam_env.sensor.effects.base import Effect, Exposure
+from spikecam_env.sensor.effects.base import Effect, ExposureBlock
 from spikecam_env.sensor.light import GRAINS, ramp, segments
 
 FRAMES, FINE, SHAPE = 12, 4000, (1, 3)
@@ -40,12 +40,12 @@ def model(*names: str, neutral: bool = False) -> SensorModel:
 def collected(effects: tuple[Effect, ...]) -> np.ndarray:
     """(FRAMES, 3) charge by the drive [thresholds]."""
     unit = SensorModel.preset("ideal").draw_unit(SHAPE, 0)
-    first = Exposure(0, RATE_HZ, SHAPE, unit)
+    first = ExposureBlock(0, RATE_HZ, SHAPE, unit)
     memory, charge = drive.begin(first, effects, seed=1), []
     for number, segment in enumerate(segments(film(), 0, FRAMES, courses=True)):
         light = ramp(segment, *unit.grains_per_frame)
         assert light.pieces
-        now = Exposure(number, RATE_HZ, SHAPE, unit)
+        now = ExposureBlock(number, RATE_HZ, SHAPE, unit)
         mean = (light.collected(1) - light.collected(0)) / GRAINS
         made, _ = drive.expected_charge(now, effects, memory, mean, light.rise / GRAINS, light.pieces)
         charge.append(made.values.reshape(-1))

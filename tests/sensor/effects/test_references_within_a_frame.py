@@ -12,7 +12,7 @@ from laws import camera, check, with_effects
 
 from spikecam_env.errors import InputError
 from spikecam_env.sensor import CATALOGUE, Effect, SensorModel, SpikeSensor, Stage
-from spikecam_env.sensor.effects.base import Exposure, Shift, parameter
+from spikecam_env.sensor.effects.base import ExposureBlock, Shift, parameter
 
 SWING_MV = 1e3 * SensorModel.preset("ideal").circuit.swing_V
 A_FRAME = 256
@@ -115,7 +115,7 @@ class Raised(Effect):
     stage = Stage.THRESHOLD
     strength = "by"
 
-    def compare(self, now: Exposure, memory: Any) -> tuple[Shift, Any]:
+    def compare(self, now: ExposureBlock, memory: Any) -> tuple[Shift, Any]:
         return Shift(factor=1.0 + self.by), memory
 
 

@@ -18,7 +18,7 @@ from spikecam_env.gap.report.exhibits import (
     spectrum,
     step,
 )
-from spikecam_env.gap.report.panels import Panel, PixelMaps
+from spikecam_env.gap.report.panels import PixelMaps, PlotPanel
 from spikecam_env.gap.result import Evidence, Statistic
 
 LEAST_Z = 4.0
@@ -32,7 +32,7 @@ class Exhibit:
     name: str
     title: str
     caption: str
-    panels: tuple[Panel, ...]
+    panels: tuple[PlotPanel, ...]
     maps: tuple[PixelMaps, ...] = ()
 
     def z(self, statistics: Sequence[Statistic]) -> float:

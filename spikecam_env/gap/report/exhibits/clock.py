@@ -8,9 +8,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from spikecam_env.calibration.real import ideal_second_difference
-from spikecam_env.gap.observe.observation import Observation
-from spikecam_env.gap.report.panels import Panel, takes
+from spikecam_env.gap.observe.observation import ObservedRecording
+from spikecam_env.gap.report.panels import PlotPanel, takes
 from spikecam_env.gap.result import Evidence
+from spikecam_env.types import Floats
 
 TITLE = "Spikes against the clock"
 CAPTION = (
@@ -18,19 +19,18 @@ CAPTION = (
     "does not depend on frames: counts run evenly through 0, and noise is the same on both sides of it."
 )
 
-Array = NDArray[np.float64]
 
 _COUNTED = np.linspace(-0.05, 0.05, 21)
 _NOISY = np.array([-0.5, -0.3, -0.15, -0.08, -0.04, -0.02, 0.0, 0.02, 0.04, 0.08, 0.15, 0.3, 0.5])
 
 
-def panels(evidence: Evidence, frame_rate_hz: float) -> Iterator[Panel]:
+def panels(evidence: Evidence, frame_rate_hz: float) -> Iterator[PlotPanel]:
     """Pixels near a whole interval, and noise of successive spikes on either side of it, of unknown scenes."""
     for t in takes(evidence, ("unknown",)):
         sides = [None if o is None else _counts(o) for o in (t.measured, t.before, t.after)]
         measured, before, after = sides
         assert measured is not None and before is not None
-        yield Panel(
+        yield PlotPanel(
             f"Pixels by interval, {t.shown.name}", "mean interval less a whole number [frames]", "pixels [count]",
             (_COUNTED[1:] + _COUNTED[:-1]) / 2, measured, before, after, np.sqrt(np.maximum(measured + before, 1.0)),
         )  # fmt: skip
@@ -39,7 +39,7 @@ def panels(evidence: Evidence, frame_rate_hz: float) -> Iterator[Panel]:
         assert seen is not None and model is not None
         known = np.isfinite(seen[0]) & np.isfinite(model[0])
         if known.sum() > 3:
-            yield Panel(
+            yield PlotPanel(
                 f"Noise beyond an ideal pixel's, {t.shown.name}", "mean interval less a whole number [frames]",
                 "excess of A_1 / 2 [1e-3 frames²]", ((_NOISY[1:] + _NOISY[:-1]) / 2)[known], seen[0][known],
                 model[0][known], None if patched is None else patched[0][known],
@@ -47,19 +47,19 @@ def panels(evidence: Evidence, frame_rate_hz: float) -> Iterator[Panel]:
             )  # fmt: skip
 
 
-def _off(o: Observation) -> tuple[NDArray[np.bool_], Array]:
+def _off(o: ObservedRecording) -> tuple[NDArray[np.bool_], Floats]:
     """(P,) which pixels count, and how far their interval is from whole."""
     good = (o.times.count > 8) & (o.times.rate < 0.8)
     interval = 1.0 / np.where(good, o.times.rate, 1.0)
     return good, interval - np.round(interval)
 
 
-def _counts(o: Observation) -> Array:
+def _counts(o: ObservedRecording) -> Floats:
     good, off = _off(o)
     return np.histogram(off[good], _COUNTED)[0].astype(np.float64)
 
 
-def _excess(o: Observation) -> tuple[Array, Array]:
+def _excess(o: ObservedRecording) -> tuple[Floats, Floats]:
     """Mean over pixels of a bin, and its standard error."""
     good, off = _off(o)
     terms = np.where(good, o.times.terms[:, 0], 0)

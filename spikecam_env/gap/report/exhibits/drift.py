@@ -7,14 +7,14 @@ from collections.abc import Iterator
 import numpy as np
 
 from spikecam_env.gap.observe.conditions import STEADY
-from spikecam_env.gap.report.panels import Panel, largest, over_pixels, takes
+from spikecam_env.gap.report.panels import PlotPanel, largest, over_pixels, takes
 from spikecam_env.gap.result import Evidence
 
 TITLE = "Through the recording"
 CAPTION = "The array's rate in sixteen parts of a recording, less the model's."
 
 
-def panels(evidence: Evidence, frame_rate_hz: float) -> Iterator[Panel]:
+def panels(evidence: Evidence, frame_rate_hz: float) -> Iterator[PlotPanel]:
     """The rate of the array in sixteen parts of a recording."""
     made = []
     for t in takes(evidence, STEADY):
@@ -22,7 +22,7 @@ def panels(evidence: Evidence, frame_rate_hz: float) -> Iterator[Panel]:
             continue
         measured, before, after, sd = over_pixels(t, lambda o: o.blocks / max(o.blocks.mean(), 1e-9))
         x = (np.arange(len(measured)) + 0.5) * (t.measured.frames / len(measured)) * 1e3 / frame_rate_hz
-        made.append(Panel(f"Rate through {t.shown.name}", "time [ms]", "rate over its mean, less 1 [%]", x,
+        made.append(PlotPanel(f"Rate through {t.shown.name}", "time [ms]", "rate over its mean, less 1 [%]", x,
                             100 * (measured - before), np.zeros(x.size),
                             None if after is None else 100 * (after - before), 100 * sd))  # fmt: skip
     yield from largest(made, 2)

@@ -7,14 +7,14 @@ from collections.abc import Iterator
 import numpy as np
 
 from spikecam_env.gap.observe.conditions import STEADY
-from spikecam_env.gap.report.panels import Panel, largest, scaled_by_twins, takes
+from spikecam_env.gap.report.panels import PlotPanel, largest, scaled_by_twins, takes
 from spikecam_env.gap.result import Evidence
 
 TITLE = "Lengths of intervals"
 CAPTION = "Share of intervals of each length, less the model's."
 
 
-def panels(evidence: Evidence, frame_rate_hz: float) -> Iterator[Panel]:
+def panels(evidence: Evidence, frame_rate_hz: float) -> Iterator[PlotPanel]:
     """Intervals by length, and how their shares differ."""
     made = []
     for t in takes(evidence, STEADY):
@@ -28,7 +28,7 @@ def panels(evidence: Evidence, frame_rate_hz: float) -> Iterator[Panel]:
         after = t.after.lengths[shown] / total[2] if t.after else None
         sd = np.sqrt(np.maximum(measured, 1 / total[0]) / total[0] + np.maximum(before, 1 / total[1]) / total[1])
         sd = scaled_by_twins(sd, t.again.lengths[shown] / max(t.again.lengths.sum(), 1) - before if t.again else None)
-        made.append(Panel(
+        made.append(PlotPanel(
             f"Intervals by length, {t.shown.name}", "length [frames]", "share, less the model's [%]",
             shown + 1.0, 100 * (measured - before), np.zeros(shown.size),
             None if after is None else 100 * (after - before), 100 * sd,

@@ -7,7 +7,7 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from spikecam_env.gap.report.panels import Array, Panel, largest, takes
+from spikecam_env.gap.report.panels import Array, PlotPanel, largest, takes
 from spikecam_env.gap.result import Evidence
 from spikecam_env.gap.statistics.film import light_film
 
@@ -18,7 +18,7 @@ CAPTION = (
 )
 
 
-def panels(evidence: Evidence, frame_rate_hz: float) -> Iterator[Panel]:
+def panels(evidence: Evidence, frame_rate_hz: float) -> Iterator[PlotPanel]:
     """Spikes too many or too few where moving light brightens, has just been brighter, has brighter neighbours ..."""
     made = []
     for t in takes(evidence, ("moving",)):
@@ -53,7 +53,7 @@ def light_features(light: Array, shape: tuple[int, int]) -> dict[str, Array]:
     return {name: f.reshape(bins, -1) for name, f in found.items()}
 
 
-def _over_feature(title: str, feature: Array, films: Sequence[NDArray[np.uint8] | None]) -> Panel | None:
+def _over_feature(title: str, feature: Array, films: Sequence[NDArray[np.uint8] | None]) -> PlotPanel | None:
     """Spikes of bins of a feature with as many entries each; None where the feature does not vary."""
     edges = np.unique(np.quantile(feature, np.linspace(0, 1, 10)))
     if edges.size < 4 or np.ptp(edges) < 1e-9:
@@ -69,7 +69,7 @@ def _over_feature(title: str, feature: Array, films: Sequence[NDArray[np.uint8] 
     off = measured - before
     scale = 100 / np.maximum(mean(before), 1e-9)
     sd = np.sqrt(np.maximum(mean(off**2) - mean(off) ** 2, 0) / size)
-    return Panel(
+    return PlotPanel(
         title, "difference in light, over the mean light [1]", "spikes over the model's, less 1 [%]",
         mean(feature.reshape(-1)), scale * mean(off), np.zeros(edges.size - 1),
         None if after is None else scale * mean(after - before), scale * sd,

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from spikecam_env.gap.observe.conditions import STEADY
-from spikecam_env.gap.report.panels import Panel, largest, scaled_by_twins, takes
+from spikecam_env.gap.report.panels import PlotPanel, largest, scaled_by_twins, takes
 from spikecam_env.gap.result import Evidence
 
 TITLE = "Neighbours"
@@ -17,7 +17,7 @@ CAPTION = (
 )
 
 
-def panels(evidence: Evidence, frame_rate_hz: float) -> Iterator[Panel]:
+def panels(evidence: Evidence, frame_rate_hz: float) -> Iterator[PlotPanel]:
     """Spikes of a pixel with its neighbour's, in the same frame and one or two after."""
     made = []
     for t in takes(evidence, STEADY):
@@ -29,7 +29,7 @@ def panels(evidence: Evidence, frame_rate_hz: float) -> Iterator[Panel]:
         again = t.again.coincidences.T.reshape(-1) if t.again else None
         # Every pair is counted both ways round.
         sd = scaled_by_twins(np.sqrt(2 / measured + 2 / before), None if again is None else again / before - 1)
-        made.append(Panel(
+        made.append(PlotPanel(
             f"Coincidences of neighbours, {t.shown.name}", "", "over the model's, less 1 [%]",
             np.arange(len(labels), dtype=np.float64), 100 * (measured / before - 1), np.zeros(len(labels)),
             None if after is None else 100 * (after / before - 1), 100 * sd,

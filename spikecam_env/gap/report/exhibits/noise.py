@@ -8,8 +8,8 @@ import numpy as np
 
 from spikecam_env.calibration.jitter import Jitter, fit_jitter
 from spikecam_env.gap.observe.conditions import STEADY
-from spikecam_env.gap.observe.observation import DIFFERENCES, Observation
-from spikecam_env.gap.report.panels import Panel, Take, against_before, by_recording, names, takes
+from spikecam_env.gap.observe.observation import DIFFERENCES, ObservedRecording
+from spikecam_env.gap.report.panels import PlotPanel, ReportedRecording, against_before, by_recording, names, takes
 from spikecam_env.gap.result import Evidence
 
 TITLE = "Temporal noise"
@@ -20,7 +20,7 @@ CAPTION = (
 )
 
 
-def panels(evidence: Evidence, frame_rate_hz: float) -> Iterator[Panel]:
+def panels(evidence: Evidence, frame_rate_hz: float) -> Iterator[PlotPanel]:
     """Temporal noise of spikes: from A_k over steps and over levels, interval variance and lag-1 by recording."""
     static = takes(evidence, STEADY)
     steps = _noise_by_step(static)
@@ -36,26 +36,26 @@ def panels(evidence: Evidence, frame_rate_hz: float) -> Iterator[Panel]:
         yield against_before("Variance of intervals", "variance over the model's, less 1 [%]", enough, measured,
                               before, after, sd, 100 / before)  # fmt: skip
         measured, before, after, sd = by_recording(enough, lambda o: o.covariance / np.nanmean(o.variance))
-        yield Panel(
+        yield PlotPanel(
             "Correlation of successive intervals", "", "lag-1 correlation [1]",
             np.arange(len(enough), dtype=np.float64), measured, before, after, sd, labels=names(enough),
         )  # fmt: skip
 
 
-def _noise_by_step(static: Sequence[Take]) -> Panel | None:
+def _noise_by_step(static: Sequence[ReportedRecording]) -> PlotPanel | None:
     """(A_k less what reading in frames adds) / 2 k T^2 over k, pooled over pixels and recordings."""
     fits = [_jitter([getattr(t, side) for t in static]) for side in ("measured", "before", "after")]
     measured, before, after = fits
     if measured is None or before is None or not np.array_equal(measured.steps, before.steps):
         return None
-    return Panel(
+    return PlotPanel(
         "Noise of a spike from A_k, by k", "k [spikes]", "noise² [1e-5 threshold²]", measured.steps.astype(np.float64),
         1e5 * measured.by_step, 1e5 * before.by_step, 1e5 * after.by_step if after else None,
         1e5 * np.hypot(measured.by_step_sd, before.by_step_sd), log="x",
     )  # fmt: skip
 
 
-def _noise_by_level(lit: Sequence[Take], light: str) -> Panel | None:
+def _noise_by_level(lit: Sequence[ReportedRecording], light: str) -> PlotPanel | None:
     """s^2 of each recording by itself."""
     fits = [[_jitter([getattr(t, side)]) for side in ("measured", "before", "after")] for t in lit]
     whole = [(t, f) for t, f in zip(lit, fits, strict=True) if f[0] and f[1] and (f[2] or t.after is None)]
@@ -64,11 +64,11 @@ def _noise_by_level(lit: Sequence[Take], light: str) -> Panel | None:
     white = np.array([[1e5 * j.white if j else np.nan for j in f] for _, f in whole])
     sd = np.array([1e5 * np.hypot(f[0].white_sd, f[1].white_sd) for _, f in whole])  # type: ignore[union-attr]
     after = None if any(t.after is None for t, _ in whole) else white[:, 2]
-    return Panel("Noise of a spike, by level", light, "noise² [1e-5 threshold²]",
+    return PlotPanel("Noise of a spike, by level", light, "noise² [1e-5 threshold²]",
                  np.array([t.shown.level for t, _ in whole]), white[:, 0], white[:, 1], after, sd, log="x")  # fmt: skip
 
 
-def _jitter(observations: Sequence[Observation | None]) -> Jitter | None:
+def _jitter(observations: Sequence[ObservedRecording | None]) -> Jitter | None:
     """The fit of A_k to static recordings; None where there are too few spikes, or no recordings."""
     known = [o for o in observations if o is not None]
     if not known or len(known) < len(observations):

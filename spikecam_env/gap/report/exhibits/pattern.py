@@ -9,7 +9,7 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from spikecam_env.gap.report.panels import Array, Panel, PixelMaps, shape_of
+from spikecam_env.gap.report.panels import Array, PixelMaps, PlotPanel, shape_of
 from spikecam_env.gap.result import Evidence
 
 TITLE = "Fixed pattern"
@@ -22,7 +22,7 @@ _TITLES = {"gain": "Response", "dark": "Dark level"}
 _UNITS = {"gain": "thresholds a frame at radiance 1", "dark": "thresholds a frame"}
 
 
-def panels(evidence: Evidence, frame_rate_hz: float) -> Iterator[Panel]:
+def panels(evidence: Evidence, frame_rate_hz: float) -> Iterator[PlotPanel]:
     """Dark level and response of pixels: how they are spread, and by row and column."""
     if np.ptp(evidence.free_refit.gain) == 0:  # unknown scenes: their light hides the pattern
         return
@@ -41,9 +41,16 @@ def panels(evidence: Evidence, frame_rate_hz: float) -> Iterator[Panel]:
         measured, before, after = relative
         assert measured is not None and before is not None
         sd = (measured - before).std(axis=axis) / np.sqrt(shape[axis])
-        yield Panel(f"Response by {name}", f"{name} [pixels]", "off the mean [%]", np.arange(sd.size, dtype=np.float64),
-                    measured.mean(axis=axis), before.mean(axis=axis),
-                    None if after is None else after.mean(axis=axis), sd)  # fmt: skip
+        yield PlotPanel(
+            f"Response by {name}",
+            f"{name} [pixels]",
+            "off the mean [%]",
+            np.arange(sd.size, dtype=np.float64),
+            measured.mean(axis=axis),
+            before.mean(axis=axis),
+            None if after is None else after.mean(axis=axis),
+            sd,
+        )
 
 
 def maps(evidence: Evidence) -> Iterator[PixelMaps]:
@@ -66,7 +73,7 @@ def _values(evidence: Evidence, what: str) -> list[Array | None]:
     ]
 
 
-def _histogram(what: str, values: Sequence[Array | None]) -> Panel | None:
+def _histogram(what: str, values: Sequence[Array | None]) -> PlotPanel | None:
     """Pixels by value; dark levels on a logarithmic axis.  Bands: the root of the counts."""
     measured, before = values[0], values[1]
     assert measured is not None and before is not None
@@ -82,5 +89,5 @@ def _histogram(what: str, values: Sequence[Array | None]) -> Panel | None:
     assert counts[0] is not None and counts[1] is not None
     middle = np.sqrt(edges[1:] * edges[:-1]) if log else (edges[1:] + edges[:-1]) / 2
     title, xlabel = f"{_TITLES[what]} of pixels", f"{_TITLES[what].lower()} [{_UNITS[what]}]"
-    return Panel(title, xlabel, "pixels [count]", middle, counts[0], counts[1], counts[2],
+    return PlotPanel(title, xlabel, "pixels [count]", middle, counts[0], counts[1], counts[2],
                  np.sqrt(np.maximum(counts[0] + counts[1], 1)), log="x" if log else "")  # fmt: skip

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from spikecam_env.gap.observe.conditions import STEADY
-from spikecam_env.gap.report.panels import Panel, against_before, by_recording, error_known, mean_known, takes
+from spikecam_env.gap.report.panels import PlotPanel, against_before, by_recording, error_known, mean_known, takes
 from spikecam_env.gap.result import Evidence
 
 TITLE = "Rates and levels"
@@ -17,7 +17,7 @@ CAPTION = (
 )
 
 
-def panels(evidence: Evidence, frame_rate_hz: float) -> Iterator[Panel]:
+def panels(evidence: Evidence, frame_rate_hz: float) -> Iterator[PlotPanel]:
     """How far rates are off the line of each pixel, and off the model's."""
     static = [c for c in evidence.conditions if c.kind in ("dark", "flat", "picture")]
     lit = np.array([c.level > 0 for c in static])
@@ -31,7 +31,7 @@ def panels(evidence: Evidence, frame_rate_hz: float) -> Iterator[Panel]:
         assert measured is not None and before is not None
         known = np.isfinite(measured - before)
         usable = known.sum(axis=1) > 1
-        yield Panel(
+        yield PlotPanel(
             "Rate off each pixel's line", evidence.light, "rate off the line [%]", level[order][usable],
             mean_known(measured, known)[usable], mean_known(before, known)[usable],
             None if after is None else mean_known(after, np.isfinite(after))[usable],

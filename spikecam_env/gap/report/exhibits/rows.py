@@ -9,15 +9,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from spikecam_env.gap.observe.conditions import STEADY
-from spikecam_env.gap.observe.observation import Observation
-from spikecam_env.gap.report.panels import Array, Panel, against_before, by_recording, largest, takes
+from spikecam_env.gap.observe.observation import ObservedRecording
+from spikecam_env.gap.report.panels import Array, PlotPanel, against_before, by_recording, largest, takes
 from spikecam_env.gap.result import Evidence
 
 TITLE = "Rows and columns in time"
 CAPTION = "Variance in time of the spikes of a row or column, less what the whole array shares, over the model's."
 
 
-def panels(evidence: Evidence, frame_rate_hz: float) -> Iterator[Panel]:
+def panels(evidence: Evidence, frame_rate_hz: float) -> Iterator[PlotPanel]:
     """Variance of rows and columns over the model's, recording by recording."""
     found = [t for t in takes(evidence, STEADY) if t.before.frame.sum() > 500]
     made = []
@@ -30,7 +30,7 @@ def panels(evidence: Evidence, frame_rate_hz: float) -> Iterator[Panel]:
     yield from largest(made, 3)
 
 
-def _line_variance_of(name: str, frames: int, observation: Observation) -> Array:
+def _line_variance_of(name: str, frames: int, observation: ObservedRecording) -> Array:
     return line_variance(observation.row if name == "row" else observation.column, frames)
 
 

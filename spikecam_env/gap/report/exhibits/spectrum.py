@@ -8,7 +8,7 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
-from spikecam_env.gap.report.panels import Array, Panel, largest, takes
+from spikecam_env.gap.report.panels import Array, PlotPanel, largest, takes
 from spikecam_env.gap.result import Evidence
 
 TITLE = "Spectrum of the population"
@@ -24,7 +24,7 @@ _SEGMENT = 1024
 """Frames of a window at most."""
 
 
-def panels(evidence: Evidence, frame_rate_hz: float) -> Iterator[Panel]:
+def panels(evidence: Evidence, frame_rate_hz: float) -> Iterator[PlotPanel]:
     """Power of the population's spike count over frequency: of the lit recording furthest off, and of the dark one."""
     for kind in (("flat", "picture", "unknown"), ("dark",)):
         made = []
@@ -36,7 +36,7 @@ def panels(evidence: Evidence, frame_rate_hz: float) -> Iterator[Panel]:
             after = averaged(t.after.frame, frame_rate_hz)[1] if t.after else None
             sd = before * np.sqrt(2 / count)
             sd = np.maximum(sd, before * _local_scatter(np.log(np.maximum(measured, NONE) / np.maximum(before, NONE))))
-            made.append(Panel(f"Power spectrum, {t.shown.name}", "frequency [Hz]", "power over white noise's [1]",
+            made.append(PlotPanel(f"Power spectrum, {t.shown.name}", "frequency [Hz]", "power over white noise's [1]",
                                 frequency, measured, before, after, sd, log="xy"))  # fmt: skip
         yield from largest(made, 1)
 

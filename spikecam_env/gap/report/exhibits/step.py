@@ -7,8 +7,8 @@ from itertools import pairwise
 
 import numpy as np
 
-from spikecam_env.gap.observe.observation import Observation
-from spikecam_env.gap.report.panels import Array, Panel, takes
+from spikecam_env.gap.observe.observation import ObservedRecording
+from spikecam_env.gap.report.panels import Array, PlotPanel, takes
 from spikecam_env.gap.result import Evidence
 from spikecam_env.gap.statistics.step import edges_of, uniform_light
 
@@ -19,7 +19,7 @@ _BIN, _BEFORE, _AFTER = 8, 64, 320
 """Frames: of a bin, and at most shown before and after an edge."""
 
 
-def panels(evidence: Evidence, frame_rate_hz: float) -> Iterator[Panel]:
+def panels(evidence: Evidence, frame_rate_hz: float) -> Iterator[PlotPanel]:
     """The array's rate around rises and falls of uniform light, and what it lacks of the model's."""
     for t in takes(evidence, ("step",)):
         edges = edges_of(uniform_light(t.shown))
@@ -33,12 +33,20 @@ def panels(evidence: Evidence, frame_rate_hz: float) -> Iterator[Panel]:
             after = around(t.after, mine, window)[1].mean(axis=1) if t.after else None
             ms = x * 1e3 / frame_rate_hz
             sd = (measured - before).std(axis=1) / np.sqrt(measured.shape[1])
-            rates = Panel(f"Rate around a {name} ({t.shown.name})", f"time from the {name} [ms]", "rate [spikes/frame]",
-                          ms, measured.mean(axis=1), before.mean(axis=1), after, sd)  # fmt: skip
+            rates = PlotPanel(
+                f"Rate around a {name} ({t.shown.name})",
+                f"time from the {name} [ms]",
+                "rate [spikes/frame]",
+                ms,
+                measured.mean(axis=1),
+                before.mean(axis=1),
+                after,
+                sd,
+            )
             height = abs(rates.before[x > 0].mean() - rates.before[x < 0].mean())
             scale = 100 / max(height, 1e-9)
             yield rates
-            yield Panel(
+            yield PlotPanel(
                 f"Residual after a {name} ({t.shown.name})", f"time from the {name} [ms]",
                 "less the model's [% of step]", ms, scale * (rates.measured - rates.before), np.zeros(x.size),
                 None if after is None else scale * (after - rates.before), scale * sd,
@@ -51,7 +59,7 @@ def free_window(edges: Sequence[int], frames: int) -> tuple[int, int]:
     return min(_BEFORE, gap // 2 // _BIN * _BIN), min(_AFTER, gap // _BIN * _BIN)
 
 
-def around(observation: Observation, edges: Sequence[int], window: tuple[int, int]) -> tuple[Array, Array]:
+def around(observation: ObservedRecording, edges: Sequence[int], window: tuple[int, int]) -> tuple[Array, Array]:
     """Middles of bins from an edge on [frames] and, mean over edges, spikes a frame of a pixel (bins, W columns).
 
     window: frames before and after an edge.
