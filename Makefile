@@ -10,7 +10,7 @@ BIN := $(VENV)/bin
 PIP := -m pip install --quiet --no-compile
 export PYTHONDONTWRITEBYTECODE :=
 
-.PHONY: install install-dev install-oldest demo test test-oldest coverage lint docs pages clean
+.PHONY: install install-dev install-oldest demo test test-slow test-oldest coverage lint docs pages clean
 
 install: $(VENV)/.installed
 install-dev: $(VENV)/.installed-dev
@@ -33,8 +33,11 @@ demo: install
 # Which renderer works is tried once: each of the many processes that draw would try it for itself.
 CHOSEN = $(BIN)/python -c "from scenes.renderers.choose import chosen; print(chosen())"
 
-test: install-dev
-	SPIKECAM_RENDERER=$${SPIKECAM_RENDERER:-$$($(CHOSEN))} $(BIN)/python -m pytest $(SHARED_OUT)
+# What takes long by nature, such as diagnoses from end to end and learning, is marked slow.
+test: MARKED = not slow
+test-slow: MARKED = slow
+test test-slow: install-dev
+	SPIKECAM_RENDERER=$${SPIKECAM_RENDERER:-$$($(CHOSEN))} $(BIN)/python -m pytest $(SHARED_OUT) -m '$(MARKED)'
 
 # The oldest releases that pyproject.toml allows (constraints-oldest.txt), in an environment of their own, without the
 # slow tests; numba's compiled code of one release is no use to another, so it goes to a folder of its own too.
@@ -74,6 +77,7 @@ docs: install-dev
 lint: install-dev
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
+	$(BIN)/python -m tools.words >/dev/null || $(BIN)/python -m tools.words
 	$(BIN)/python -c 'import sys; sys.exit(sys.version_info >= (3, 11))' || $(BIN)/mypy  # the numpy of 3.10 has other types
 	$(BIN)/lint-imports
 
