@@ -1,1 +1,1 @@
-"""Programs that build what is shipped; run from a checkout, `python -m tools.NAME`.  Not installed."""
+"""Programs that build shipped files; run from a checkout, `python -m tools.NAME`.  Not installed."""

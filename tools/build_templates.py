@@ -1,12 +1,12 @@
-"""The shipped templates: what each candidate does to the statistics of the standard design, by simulation.
+"""The shipped templates: the effect of each candidate on the statistics of the standard design, by simulation.
 
     python -m tools.build_templates out/templates                                 all of them, into the package
     python -m tools.build_templates out/templates --rebuild crosstalk dead_time   these; all others as they are shipped
     python -m tools.build_templates out/templates --only dead_time                into the folder alone
 
-A template is one small file in the folder, named by the effect's law too, and what is there is kept: a build that was
-stopped goes on.  Weak ones and severe ones: see `screen/templates.py`.  What is shipped is of a law and of a null
-model; where the null model is another by now, all have to be rebuilt.
+A template is one small file in the folder, named by the effect's law too.  Files in the folder are kept, so that a
+stopped build goes on.  Weak ones and severe ones: see `screen/templates.py`.  Shipped templates belong to a law and a
+null model; after a change of the null model all have to be rebuilt.
 """
 
 from __future__ import annotations
@@ -54,7 +54,8 @@ def build(folder: Path, standard: Standard, names: Sequence[str]) -> Templates:
 def merged(shipped: Templates, made: Templates) -> Templates:
     """The shipped templates with those of some candidates made anew.
 
-    Raises InputError where the null model is another by now, so that what is shipped does not belong beside them.
+    Raises:
+        InputError: the null model has changed, so that the shipped templates do not belong beside these.
     """
     new, gone = set(made.keys) - set(shipped.keys), set(shipped.keys) - set(made.keys)
     if made.keys != shipped.keys:
@@ -103,7 +104,7 @@ def main(
     """Simulate every candidate's templates and write them into the package.
 
     Args:
-        out: a folder of one file a template; what is there is kept.
+        out: a folder of one file a template; existing files are kept.
         only: candidates to simulate into the folder; the package's file stays as it is.
         rebuild: candidates to simulate; of all others the package's templates are kept.
         same_law: candidates whose code has changed but not their law: their templates are kept, and taken to be of it.

@@ -20,7 +20,7 @@ from spikecam_env.whole import write_text_whole
 
 DOCS = Path(__file__).parents[1] / "docs"
 WIDTH = 88
-"""Columns of a line of code: what the article shows at a window of 1280 pixels."""
+"""Columns of a line of code that the site shows at a window of 1280 pixels."""
 BLOCK = re.compile(r"(?P<head>^```(?P<language>python|bash)\n)(?P<code>.*?)(?P<end>^```$)", re.MULTILINE | re.DOTALL)
 PLAIN = re.compile(r"(?P<head>^```(?:text)?\n)(?P<code>(?:spikecam|python|export) .*?)(?P<end>^```$)", re.M | re.DOTALL)
 INDENTED = re.compile(r"(?P<head>\n\n)(?P<code>(?: {4}(?:spikecam|python|pip|export) .*\n)+)(?P<end>(?=\n|\Z))")

@@ -16,7 +16,7 @@ from matplotlib.axes import Axes
 from spikecam_env.whole import whole_file
 
 Stage = tuple[str, str]
-"""Name, and what it does in two lines."""
+"""Name, and its work in two lines."""
 
 BEFORE: tuple[Stage, ...] = (
     ("read", "recordings\nto numbers"),
@@ -34,7 +34,7 @@ SEARCH: tuple[Stage, ...] = (
 AFTER: tuple[Stage, ...] = (
     ("gate", "is anything left\nbeyond chance?"),
     ("verdict", "name, class\nor structure"),
-    ("bounds", "limits on what\nwas not found"),
+    ("bounds", "limits on effects\nnot named"),
 )
 ROWS = ((BEFORE, "#dbe7f5"), (SEARCH, "#fbe6cf"), (AFTER, "#dcefdc"))
 

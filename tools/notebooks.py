@@ -1,4 +1,4 @@
-"""Notebooks of tutorials: the same text, code and commands, with what they print and draw.
+"""Notebooks of tutorials: the same text, code and commands, with their printed and drawn results.
 
 python -m tools.notebooks            # all of them, in docs/notebooks: some minutes
 python -m tools.notebooks denoise    # one

@@ -1,4 +1,4 @@
-"""What an agent is shown of every task, at four moments of an oracle's episode, as one picture.
+"""The observations of every task, at four moments of an oracle's episode, as one picture.
 
 python -m tools.task_pictures docs/tasks.jpg
 """
@@ -44,26 +44,31 @@ WORDS = {
     "LowLight": "As Track, in dim light: a pixel\nfires every 20 to 200 frames.",
     "Exposure": "As Track, while the light\nchanges a thousandfold. An iris\nmakes up for it.",
 }
-"""What each task asks, in a few lines."""
+"""The aim of each task, in a few lines."""
 
 LEGEND = (
     ("Four moments of an episode, as an agent is shown them (tfp). Marks for the reader: ", INK),
     ("the target, ", TARGET),
-    ("what counts as looked at", MIDDLE),
+    ("the middle of the view", MIDDLE),
 )
 
 
 @dataclass(frozen=True)
 class Moment:
-    """seen: (H, W) uint8, the observation; target: (x, y) [pixels]; radius: of it [pixels]; near: to the middle, where
-    it counts as looked at [pixels]; axes: that the camera turns about; line: what is said below."""
+    """A moment of an episode."""
 
     seen: NDArray[np.uint8]
+    """The observation, (H, W)."""
     target: tuple[float, float]
+    """(x, y) [pixels]."""
     radius: float
+    """Of the target [pixels]."""
     near: float
+    """Largest distance to the middle that counts as on target [pixels]."""
     axes: int
+    """Axes about which the camera turns."""
     line: str
+    """Text below the picture."""
 
 
 def moments(name: str) -> list[Moment]:
@@ -127,7 +132,7 @@ def _row(name: str, shown: list[Moment]) -> Image.Image:
 
 def _marked(moment: Moment) -> Image.Image:
     """The observation for a screen (gamma 2.2), enlarged, with a green square about the target, and in yellow what
-    counts as looked at: a circle, or, where the camera only pans, two bars."""
+    the region that counts as the middle: a circle, or, where the camera only pans, two bars."""
     light = (255 * (moment.seen / 255) ** (1 / 2.2)).astype(np.uint8)
     rows, columns = light.shape
     picture = Image.fromarray(light).resize((ZOOM * columns, ZOOM * rows), Image.Resampling.NEAREST).convert("RGB")

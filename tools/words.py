@@ -1,4 +1,4 @@
-"""Sentences of the code: few say "what" in the place of a noun, and few are long.  `make lint` runs this.
+"""Sentences of the code: short ones, that name the thing.  `make lint` runs this.
 
 python -m tools.words [PATH ...]     lists them; exit status 1 where a share is over its limit
 """
