@@ -129,8 +129,8 @@ This page and those of the stages are made by `python -m tools.effects_page docs
 """
 
 _CHAPTER = """x is the charge of a frame over the threshold phi; T is the mean interval in frames; N counts the
-electrons to a threshold; kappa is the relative noise of a spike's threshold; A_k is E[(t_(n+2k) - 2 t_(n+k) + t_n)^2] of
-spike times t. Each entry states the strength at which no bit changes. [Effects](../effects.md) has the table of all.
+electrons to a threshold; kappa is the relative noise of a spike's threshold; A_k is E[(t_(n+2k) - 2 t_(n+k) + t_n)^2]
+of spike times t. Each entry states the strength at which no bit changes. [Effects](../effects.md) has the table of all.
 """
 
 _TAIL = '''## Adding an effect
