@@ -6,8 +6,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from spikecam_env.sensor.effects.base import Effect
-from spikecam_env.sensor.kernels.ahead import same_light
-from spikecam_env.sensor.light import Segment
+from spikecam_env.sensor.light import Segment, same_light
 from spikecam_env.types import Pictures
 
 

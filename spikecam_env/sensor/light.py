@@ -32,6 +32,7 @@ from numpy.typing import ArrayLike, NDArray
 from spikecam_env.compiled import njit
 from spikecam_env.errors import InputError
 from spikecam_env.sensor.between_keys import key_weights
+from spikecam_env.sensor.compiled_tools.intrinsics import use_widest_vectors
 
 GRAINS = 1 << 23
 """Grains of charge to one threshold."""
@@ -425,3 +426,19 @@ def as_light(radiance: Keyframes | ArrayLike, shape: tuple[int, int]) -> Keyfram
         )
     check_radiance(picture)
     return picture
+
+
+def same_light(a: NDArray[np.float32], b: NDArray[np.float32]) -> bool:
+    """Whether two pictures have the same values, every pixel."""
+    if a.flags.c_contiguous and a.flags.writeable:
+        return bool(_same_words(a.view(np.uint32), b.view(np.uint32)))
+    return np.array_equal(a, b)
+
+
+@njit(cache=True, nogil=True, boundscheck=False)
+def _same_words(a: NDArray[np.uint32], b: NDArray[np.uint32]) -> bool:
+    use_widest_vectors()
+    different = np.uint32(0)
+    for i in range(a.size):
+        different |= np.uint32(a[i] ^ b[i])
+    return different == 0  # type: ignore[no-any-return]

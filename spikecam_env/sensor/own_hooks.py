@@ -23,7 +23,16 @@ from numpy.typing import NDArray
 from spikecam_env.checked import as_number
 from spikecam_env.errors import InputError, OwnCodeError, shown
 from spikecam_env.own_code import line_in, own_code
-from spikecam_env.sensor.effects.base import PACKAGE, Charge, Effect, ExposureBlock, Feedback, Few, Shift
+from spikecam_env.sensor.effects.base import (
+    NEW_CLASS_CHECKS,
+    PACKAGE,
+    Charge,
+    Effect,
+    ExposureBlock,
+    Feedback,
+    Few,
+    Shift,
+)
 from spikecam_env.sensor.ranges import check_parameters
 from spikecam_env.sensor.unit import UNIT_RANGES, PixelArray
 
@@ -389,3 +398,5 @@ CHECKS: dict[str, Check] = {
     "feedback": _feedback,
 }
 """What is checked of each hook."""
+
+NEW_CLASS_CHECKS.append(guard)

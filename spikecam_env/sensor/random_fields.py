@@ -12,15 +12,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from spikecam_env.compiled import njit
-from spikecam_env.sensor.kernels.draws import GOLDEN, first_key, second_key, standard
-from spikecam_env.sensor.kernels.intrinsics import use_widest_vectors
-from spikecam_env.sensor.kernels.quantile import fitted_polynomial
+from spikecam_env.sensor.compiled_tools.draws import GOLDEN, first_key, second_key, standard
+from spikecam_env.sensor.compiled_tools.intrinsics import use_widest_vectors
+from spikecam_env.sensor.compiled_tools.quantile import fitted_polynomial
 from spikecam_env.types import Pictures
 
 Words = tuple[np.uint32, np.uint32]
 """What fixes every draw of a field."""
 
-DRAWS = 0x3BD9BCE3
+DRAWS = 0x9D0F0548
 """Checksum of the draws compiled in: numba's cache sees a change of this file, not of those it imports from."""
 
 TILE = 1024

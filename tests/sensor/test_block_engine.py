@@ -5,8 +5,6 @@ Bit for bit without noise, effect by effect: tests/sensor/effects/test_every_eff
 
 from __future__ import annotations
 
-import inspect
-import zlib
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -16,9 +14,9 @@ from laws import jittered, with_effects
 
 from benchmarks.agreement import compare, observe
 from spikecam_env.errors import InputError
-from spikecam_env.sensor import CATALOGUE, Effect, SensorModel, SpikeSensor, Stage, Unit, crossing, decay, random_fields
+from spikecam_env.sensor import CATALOGUE, Effect, SensorModel, SpikeSensor, Stage, Unit
 from spikecam_env.sensor.effects.base import Charge, ExposureBlock, parameter
-from spikecam_env.sensor.kernels import block, block_loop, draws, loop
+from spikecam_env.sensor.kernels import block, block_loop
 from spikecam_env.sensor.light import Segment
 from spikecam_env.sensor.model import generator
 from spikecam_env.sensor.random_fields import octave_field, white_field, words
@@ -280,22 +278,3 @@ def test_octave_field_keeps_unit_variance_and_its_correlation() -> None:
         product = (one * total[20]).mean()
         print(f"{name}: {product:.4f}, expected {expected:.4f}")
         assert abs(product - expected) < 4.5 * np.sqrt(2 / value.size)
-
-
-def test_the_kernel_names_the_decay_that_it_is_compiled_with() -> None:
-    now = zlib.crc32(inspect.getsource(decay).encode())
-    assert now == block_loop.DECAY, f"the decay has changed: write DECAY = {now:#x} in {block_loop.__file__}"
-
-
-def test_the_kernel_names_the_crossings_that_it_is_compiled_with() -> None:
-    now = zlib.crc32(inspect.getsource(crossing).encode())
-    assert now == block_loop.CROSSING, f"crossings have changed: write CROSSING = {now:#x} in {block_loop.__file__}"
-
-
-def test_kernels_name_the_draws_that_they_are_compiled_with() -> None:
-    """Numba's cache sees a change of the file it compiles, not of one that it imports from."""
-    of_draws = (loop.scramble, loop.first_key, loop.second_key, loop.byte_sum, loop.bell, loop.bell_of, draws.standard)
-    source = "".join(inspect.getsource(function.py_func) for function in of_draws)
-    now = zlib.crc32(source.encode())
-    for kernel in (block_loop, random_fields):
-        assert now == kernel.DRAWS, f"the draws have changed: write DRAWS = {now:#x} in {kernel.__file__}"

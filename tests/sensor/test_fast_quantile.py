@@ -11,8 +11,9 @@ from numpy.typing import NDArray
 from scipy import special, stats
 
 from spikecam_env.sensor import SensorModel
-from spikecam_env.sensor.kernels import fast, loop
-from spikecam_env.sensor.kernels.quantile import bell_cdf, charge_cdf, fitted_polynomial
+from spikecam_env.sensor.compiled_tools import draws
+from spikecam_env.sensor.compiled_tools.quantile import bell_cdf, charge_cdf, fitted_polynomial
+from spikecam_env.sensor.kernels import fast
 
 
 def polynomial_at(x: NDArray[np.float64], electrons: float, kappa: float) -> NDArray[np.float64]:
@@ -74,19 +75,19 @@ def test_a_fit_takes_less_than_a_fifth_of_a_second() -> None:
 
 
 @njit
-def draws(pixels: int, spikes: int, seed_low: np.uint32, seed_high: np.uint32) -> NDArray[np.float64]:
+def sampled(pixels: int, spikes: int, seed_low: np.uint32, seed_high: np.uint32) -> NDArray[np.float64]:
     out = np.empty((pixels, spikes))
     for p in range(pixels):
-        key = loop.first_key(p, seed_low)
+        key = draws.first_key(p, seed_low)
         for i in range(spikes):
             counter = np.uint32(key + np.uint32(np.uint32(i) * np.uint32(0x9E3779B9)))
-            out[p, i] = loop.bell(counter, loop.second_key(key, seed_high))
+            out[p, i] = draws.bell(counter, draws.second_key(key, seed_high))
     return out
 
 
 @pytest.fixture(scope="module")
 def sample() -> NDArray[np.float64]:
-    return draws(40_000, 50, np.uint32(0xDEADBEEF), np.uint32(0x12345678))
+    return sampled(40_000, 50, np.uint32(0xDEADBEEF), np.uint32(0x12345678))
 
 
 def test_draws_follow_the_sum_of_eight_bytes(sample: NDArray[np.float64]) -> None:
@@ -118,7 +119,7 @@ def test_cameras_of_neighbouring_seeds_share_no_draws() -> None:
     pixels = 4096
     unit = SensorModel.preset("scsim").draw_unit((1, pixels), 0)
     states = [fast.start(unit, np.zeros(pixels), seed) for seed in range(4)]
-    firsts = [draws(pixels, 1, *s.seeds).ravel() for s in states]
+    firsts = [sampled(pixels, 1, *s.seeds).ravel() for s in states]
     equal = sum(np.sum(a[:, None] == b) for i, a in enumerate(firsts) for b in firsts[:i])
     step, sd = 2.0**-16, np.sqrt(8 / 12)
     by_chance = 6 * pixels**2 * step / (2 * np.sqrt(np.pi) * sd)

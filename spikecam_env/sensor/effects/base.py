@@ -38,7 +38,7 @@ from __future__ import annotations
 
 import dataclasses
 import re
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from enum import Enum, IntEnum
 from typing import Any, ClassVar, NamedTuple
 
@@ -56,6 +56,9 @@ from spikecam_env.types import Floats, Masks, Pictures
 
 PACKAGE = f"{__package__}."
 """Modules of the package's own effects begin with it; hooks of others are checked (`sensor/own_hooks.py`)."""
+
+NEW_CLASS_CHECKS: list[Callable[[type[Effect]], None]] = []
+"""Called with each new class of another package, when the class is made."""
 
 MOST_PARTS = 1024
 """Parts of a frame at most: 32 periods of a sine."""
@@ -306,9 +309,8 @@ class Effect:
     def __init_subclass__(cls) -> None:
         cls.name = effect_name(cls.__name__)
         if not cls.__module__.startswith(PACKAGE):
-            from spikecam_env.sensor.own_hooks import guard  # it knows all that hooks return, which is defined here
-
-            guard(cls)
+            for check in NEW_CLASS_CHECKS:
+                check(cls)
 
     def __post_init__(self) -> None:
         check_parameters(self, self.name)

@@ -14,10 +14,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from spikecam_env.compiled import njit
 from spikecam_env.sensor.kernels import fast
-from spikecam_env.sensor.kernels.intrinsics import use_widest_vectors
-from spikecam_env.sensor.light import MAX_SEGMENT, Segment
+from spikecam_env.sensor.light import MAX_SEGMENT, Segment, same_light
 from spikecam_env.sensor.unit import Unit
 
 FEW = 4
@@ -129,19 +127,3 @@ def _is_steady(segment: Segment) -> bool:
 def _sample(segment: Segment) -> bytes:
     every = max(1, segment.radiance0.size // _SAMPLED)
     return segment.radiance0[::every].tobytes() + segment.radiance1[::every].tobytes()
-
-
-def same_light(a: NDArray[np.float32], b: NDArray[np.float32]) -> bool:
-    """Whether two pictures have the same values, every pixel."""
-    if a.flags.c_contiguous and a.flags.writeable:
-        return bool(_same_words(a.view(np.uint32), b.view(np.uint32)))
-    return np.array_equal(a, b)
-
-
-@njit(cache=True, nogil=True, boundscheck=False)
-def _same_words(a: NDArray[np.uint32], b: NDArray[np.uint32]) -> bool:
-    use_widest_vectors()
-    different = np.uint32(0)
-    for i in range(a.size):
-        different |= np.uint32(a[i] ^ b[i])
-    return different == 0  # type: ignore[no-any-return]

@@ -27,9 +27,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from spikecam_env.compiled import njit
+from spikecam_env.sensor.compiled_tools.draws import GOLDEN, first_key, second_key, standard
 from spikecam_env.sensor.crossing import MOST_AGAIN, NEVER, crossing_between
 from spikecam_env.sensor.decay import LONG, decayed
-from spikecam_env.sensor.kernels.draws import GOLDEN, first_key, second_key, standard
 from spikecam_env.sensor.light import GRAINS, LEAST_LIMIT, MOST_GRAINS
 from spikecam_env.sensor.light import on_grid as rounded
 from spikecam_env.types import Floats, Pictures
@@ -61,7 +61,7 @@ WORTH, SPARSE = 4, 0.5
 """Frames of a block from which on, and spikes a pixel and frame up to which, going from spike to spike is faster than
 going from frame to frame."""
 
-DRAWS, DECAY, CROSSING = 0x3BD9BCE3, 0xFDEE1FA, 0xADDA886E
+DRAWS, DECAY, CROSSING = 0x9D0F0548, 0x0FDEE1FA, 0xADDA886E
 """Checksums of the draws, the decay and the crossings within a frame compiled in: numba's cache sees a change of this
 file, not of those it imports from."""
 

@@ -19,7 +19,7 @@ from numba.np.numpy_support import carray
 from numpy.typing import NDArray
 
 from spikecam_env.compiled import njit
-from spikecam_env.sensor.kernels.intrinsics import pointer_to, prefetch, take_ticket, use_widest_vectors
+from spikecam_env.sensor.compiled_tools.intrinsics import pointer_to, prefetch, take_ticket, use_widest_vectors
 from spikecam_env.sensor.kernels.loop import (
     BELL,
     CAP,
@@ -71,7 +71,7 @@ from spikecam_env.sensor.light import GRAINS
 AT_ONCE = 4
 """Frames at a time, and charges of each pixel that are ready."""
 
-LOOP = 0xBE0A1089
+LOOP = 0x16C5F42B
 """Checksum of the file of `loop`, of which much is compiled in: numba's cache sees a change of this file, not of those
 it imports from."""
 

@@ -17,10 +17,10 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from spikecam_env.sensor.compiled_tools.intrinsics import address_of
+from spikecam_env.sensor.compiled_tools.quantile import MIN_ELECTRONS, fitted_polynomial
 from spikecam_env.sensor.effects import Effect
 from spikecam_env.sensor.kernels import every_frame, loop
-from spikecam_env.sensor.kernels.intrinsics import address_of
-from spikecam_env.sensor.kernels.quantile import MIN_ELECTRONS, fitted_polynomial
 from spikecam_env.sensor.light import GRAINS, Segment
 from spikecam_env.sensor.model import generator
 from spikecam_env.sensor.unit import Unit

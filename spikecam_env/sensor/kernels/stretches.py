@@ -8,10 +8,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from spikecam_env.compiled import njit
+from spikecam_env.sensor.compiled_tools.intrinsics import address_of
 from spikecam_env.sensor.imaging import Imaging
 from spikecam_env.sensor.kernels import loop
 from spikecam_env.sensor.kernels.fast import FastState, Stretch
-from spikecam_env.sensor.kernels.intrinsics import address_of
 from spikecam_env.sensor.light import COUNT, FIRST, KEY0, KEY1, LENGTH, MAX_SEGMENT, Keyframes, Segment, cuts, segments
 
 
