@@ -1,7 +1,6 @@
-"""The law of an effect as a digest of its code, by which one knows that what was simulated of it is out of date.
+"""The law of an effect as a digest of its code: where it differs, earlier simulations of the effect are out of date.
 
-Comments, docstrings, the meaning of parameters and of experiments in words are left out: they change no simulation.
-Code that the effect's file imports is not followed; a change there is its author's to think of.
+Comments, docstrings and other words are left out: they change no simulation.  Imported code is not followed.
 """
 
 from __future__ import annotations
@@ -24,9 +23,17 @@ def law_digest(effect: type[Effect]) -> str:
 
 class _WithoutWords(ast.NodeTransformer):
     def visit_Expr(self, node: ast.Expr) -> ast.AST | None:
-        is_text = isinstance(node.value, ast.Constant) and isinstance(node.value.value, str)
-        return ast.Pass() if is_text else self.generic_visit(node)
+        return ast.Pass() if _is_text(node) else self.generic_visit(node)
+
+    def visit_ClassDef(self, node: ast.ClassDef) -> ast.AST:
+        """Meanings of fields go; the class docstring, first, stays as a `pass`."""
+        node.body = [part for n, part in enumerate(node.body) if n == 0 or not _is_text(part)]
+        return self.generic_visit(node)
 
     def visit_Call(self, node: ast.Call) -> ast.AST:
         node.keywords = [keyword for keyword in node.keywords if keyword.arg not in _WORDS]
         return self.generic_visit(node)
+
+
+def _is_text(node: ast.stmt) -> bool:
+    return isinstance(node, ast.Expr) and isinstance(node.value, ast.Constant) and isinstance(node.value.value, str)

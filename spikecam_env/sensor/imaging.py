@@ -1,4 +1,4 @@
-"""Static optics: what the lens makes of the light that a scene gives."""
+"""Static optics: the image that the lens gives of a scene."""
 
 from __future__ import annotations
 
@@ -14,8 +14,8 @@ class Imaging:
     """The optics among a model's effects, for pictures of `shape`.
 
     They are linear, so they act on the two ends of a ramp.  The images of the last two pictures are kept, since a key
-    interval begins where the one before it ended.  A picture is known again by its values: whoever changes an array in
-    place gets another image.
+    interval begins where the one before it ended.  Pictures are compared by value: an array
+    that was changed in place gets another image.
     """
 
     def __init__(self, effects: Sequence[Effect], shape: tuple[int, int]) -> None:

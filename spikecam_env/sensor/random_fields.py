@@ -1,4 +1,4 @@
-"""Random fields: a number for every pixel and frame, made by hashing both, so that no generator need be kept in step.
+"""Random fields: a number for every pixel and frame, a hash of both, so that no generator need be kept in step.
 
 White noise is the jump kernel's draw with the frame in the spike number's place; octaves are AR(1) processes on it.
 Numba's cache looks only at the file of the function it compiles: see `DRAWS`.
@@ -15,10 +15,10 @@ from spikecam_env.compiled import njit
 from spikecam_env.sensor.compiled_tools.draws import GOLDEN, first_key, second_key, standard
 from spikecam_env.sensor.compiled_tools.intrinsics import use_widest_vectors
 from spikecam_env.sensor.compiled_tools.quantile import fitted_polynomial
-from spikecam_env.types import Pictures
+from spikecam_env.types import Floats, Pictures
 
 Words = tuple[np.uint32, np.uint32]
-"""What fixes every draw of a field."""
+"""The key of every draw of a field."""
 
 DRAWS = 0x9D0F0548
 """Checksum of the draws compiled in: numba's cache sees a change of this file, not of those it imports from."""
@@ -47,15 +47,26 @@ def octave_field(
     of: Sequence[Words],
     sigma: float,
     value: Pictures,
-    every: NDArray[np.float64],
-    kept: NDArray[np.float64],
+    every: Floats,
+    kept: Floats,
     first: int,
     frames: int,
 ) -> tuple[Pictures, Pictures]:
-    """The sum (frames, H, W) of AR(1) processes, and their values (octaves, H, W) after the last frame.
+    """The sum of AR(1) processes.
 
-    sigma: standard deviation of each.  value: before frame `first`.  Process j moves in frames that every[j] divides:
-    v <- kept v + sigma sqrt(1 - kept^2) n.
+    Process j moves in frames that every[j] divides: v <- kept v + sigma sqrt(1 - kept^2) n.
+
+    Args:
+        of: the words of each.
+        sigma: standard deviation of each.
+        value: of each before frame `first` (octaves, H, W).
+        every: frames between moves of each.
+        kept: autocorrelation of each from move to move.
+        first: number of the first frame.
+        frames: how many.
+
+    Returns:
+        The sum (frames, H, W), and the values (octaves, H, W) after the last frame.
     """
     last = value.copy()
     total = np.empty((frames, *value.shape[1:]), dtype=np.float32)
@@ -80,9 +91,7 @@ def _normal(sigma: float) -> tuple[np.float32, ...]:
 
 
 @njit(cache=True, nogil=True, error_model="numpy", boundscheck=False)
-def _white(
-    low: np.uint32, high: np.uint32, first: int, polynomial: tuple[np.float32, ...], out: NDArray[np.float32]
-) -> None:
+def _white(low: np.uint32, high: np.uint32, first: int, polynomial: tuple[np.float32, ...], out: Pictures) -> None:
     """out: (F, P) float32, overwritten."""
     use_widest_vectors()
     frames, pixels = out.shape
@@ -101,12 +110,12 @@ def _white(
 def _octaves(
     words: NDArray[np.uint32],
     every: NDArray[np.int64],
-    kept: NDArray[np.float32],
-    driven: NDArray[np.float32],
+    kept: Pictures,
+    driven: Pictures,
     first: int,
     polynomial: tuple[np.float32, ...],
-    value: NDArray[np.float32],
-    total: NDArray[np.float32],
+    value: Pictures,
+    total: Pictures,
 ) -> None:
     """value: (J, P) float32, updated.  total: (F, P) float32, overwritten.
 

@@ -80,7 +80,7 @@ def test_looking_ahead_changes_no_bit(stays: int) -> None:
             light[:] = wild_light(pixels, frame)[0]
         segment = Segment(light, light, 64, 0, int(rng.choice([1, 1, 1, 1, 1, 1, 1, 2, 10])))
         assert np.array_equal(ahead.run(looking, segment), fast.run(plain, segment))
-    ahead.take_back(looking)
+    ahead.roll_back(looking)
     assert np.array_equal(looking.pixels.remaining, plain.remaining)
     assert np.array_equal(looking.pixels.fired, plain.fired)
 
@@ -98,7 +98,7 @@ def test_looking_ahead_in_a_film_changes_no_bit() -> None:
     assert looking.reach == 64
     for first in range(41, 64):
         ahead.run(other, Segment(start, stop, 64, first, 1))
-    ahead.take_back(other)
+    ahead.roll_back(other)
     assert np.array_equal(other.pixels.remaining, plain.remaining)
 
 

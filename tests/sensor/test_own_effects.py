@@ -157,7 +157,7 @@ def test_another_process_loads_the_file_by_itself(file: Path, catalogue: None) -
     held = pickle.dumps(model)
     written(file, ("(0.05,", "(0.06,"))
     done = subprocess.run([sys.executable, "-c", code], input=held, capture_output=True)
-    assert "is not what it was when grey_filter was saved" in done.stderr.decode()
+    assert "has changed since grey_filter was saved" in done.stderr.decode()
 
 
 class _Package:

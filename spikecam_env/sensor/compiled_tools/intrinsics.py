@@ -1,4 +1,4 @@
-"""Instructions to the compiler that numba has no word for.  None can change a bit of what is computed."""
+"""Instructions to the compiler that numba has no word for.  None can change a bit of a result."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ def use_widest_vectors(typing_context: Any) -> Any:
 
 @instruction
 def take_ticket(typing_context: Any, tickets: Any, row: Any) -> Any:
-    """The next number of a counter that threads share: adds one to tickets[row, 0] (int64), returns what it was."""
+    """The next number of a counter that threads share: adds one to tickets[row, 0] (int64), returns its old value."""
 
     def fetch_and_add(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
         array = make_array(signature.args[0])(context, builder, arguments[0])

@@ -1,7 +1,8 @@
 """The spread of a threshold as a polynomial: from a sum of eight random bytes to the exact law of a spike's charge.
 
-A pixel whose threshold is N electrons, redrawn at each reset with relative spread kappa, fires when its expected charge
-has advanced by X = Gamma(N (1 + kappa n)) / N, n ~ N(0, 1).  With L = log(1 - i u / N) its characteristic function is
+A pixel has a threshold of N electrons, redrawn at each reset with relative spread kappa.  It fires when its expected
+charge has advanced by X = Gamma(N (1 + kappa n)) / N, n ~ N(0, 1).  With L = log(1 - i u / N) the law has
+the characteristic function
 
     E exp(i u X) = exp(-N L + (kappa N L)^2 / 2),       mean 1, variance s^2 = 1/N + kappa^2
 

@@ -1,4 +1,4 @@
-"""Light of a step as the fast engine takes it: stretches of 64 frames at most, with the addresses of its pictures."""
+"""Light of a step for the fast engine: stretches of 64 frames at most, with the addresses of its pictures."""
 
 from __future__ import annotations
 
@@ -13,10 +13,11 @@ from spikecam_env.sensor.imaging import Imaging
 from spikecam_env.sensor.kernels import loop
 from spikecam_env.sensor.kernels.fast import FastState, Stretch
 from spikecam_env.sensor.light import COUNT, FIRST, KEY0, KEY1, LENGTH, MAX_SEGMENT, Keyframes, Segment, cuts, segments
+from spikecam_env.types import Pictures, Spikes
 
 
 def stretches(
-    state: FastState, light: Keyframes | NDArray[np.float32], start: int, imaging: Imaging, spikes: NDArray[np.uint8]
+    state: FastState, light: Keyframes | Pictures, start: int, imaging: Imaging, spikes: Spikes
 ) -> Iterator[Stretch]:
     """The frames from `start` on, as many as there are in spikes (frames, P), through the optics."""
     if isinstance(light, Keyframes) and not imaging:
@@ -27,10 +28,8 @@ def stretches(
     return _of_segments(state, map(imaging.seen, segments(light, start, len(spikes))), spikes)
 
 
-def _of_keys(
-    state: FastState, radiance: NDArray[np.float32], pieces: NDArray[np.int64], spikes: NDArray[np.uint8]
-) -> Iterator[Stretch]:
-    """Between keys at whole frames, whose pictures are taken where they lie."""
+def _of_keys(state: FastState, radiance: Pictures, pieces: NDArray[np.int64], spikes: Spikes) -> Iterator[Stretch]:
+    """Stretches between keys at whole frames, whose pictures are not copied."""
     if len(spikes) <= MAX_SEGMENT:
         yield Stretch(state, pieces, (radiance,), spikes, spikes.shape[1])
         return
@@ -45,8 +44,13 @@ def _of_keys(
 
 @njit(cache=True, nogil=True)
 def _at_keys(rows: NDArray[np.int64], address: int, size: int) -> NDArray[np.int64]:
-    """Rows of `cuts` as pieces of `loop.advance`, the keys' pictures lying from an address on, `size` bytes from one to
-    the next; none where a row needs a picture that is no key's."""
+    """Rows of `cuts` as pieces of `loop.advance`; none where a row needs a picture that is no key's.
+
+    Args:
+        rows: of `cuts`.
+        address: of the first key's picture.
+        size: bytes from one picture to the next.
+    """
     pieces = np.empty((len(rows), loop.PIECE_COLUMNS), np.int64)
     for k in range(len(rows)):
         if rows[k, KEY0] < 0 or rows[k, KEY1] < 0:
@@ -58,8 +62,8 @@ def _at_keys(rows: NDArray[np.int64], address: int, size: int) -> NDArray[np.int
     return pieces
 
 
-def _of_segments(state: FastState, segments: Iterator[Segment], spikes: NDArray[np.uint8]) -> Iterator[Stretch]:
-    """Of pictures that are worked out one after another."""
+def _of_segments(state: FastState, segments: Iterator[Segment], spikes: Spikes) -> Iterator[Stretch]:
+    """Stretches of pictures that are computed one after another."""
     waiting: list[Segment] = []
     done = frames = 0
     for segment in segments:
