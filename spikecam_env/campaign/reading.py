@@ -100,7 +100,9 @@ class CampaignRecording:
 
     def packed(self) -> NDArray[np.uint8]:
         """(frames, ceil(H W / 8)) uint8 bits of the stream, mapped from the file; InputError for rates only."""
-        return np.memmap(self._stream(), np.uint8, "r", shape=(self.frames, packed_bytes(self.shape)))
+        if self.spikes is None:
+            raise InputError(f"recording {self.name!r} holds rates only, no spikes; read it with rate()")
+        return np.memmap(self.spikes, np.uint8, "r", shape=(self.frames, packed_bytes(self.shape)))
 
     def load(self) -> Spikes:
         """(frames, H, W) uint8 spikes; InputError for rates only."""
@@ -111,11 +113,6 @@ class CampaignRecording:
         if self.rates is None:
             raise InputError(f"recording {self.name!r} is a stream of spikes; read it with load() or packed()")
         return _rates(self.rates, self.name, self.shape)[0]
-
-    def _stream(self) -> Path:
-        if self.spikes is None:
-            raise InputError(f"recording {self.name!r} holds rates only, no spikes; read it with rate()")
-        return self.spikes
 
 
 @dataclass(frozen=True)

@@ -24,7 +24,6 @@ from spikecam_env.campaign.writing import finish_campaign, save_light, save_spik
 from spikecam_env.checked import checked_count, checked_seed, checked_shape
 from spikecam_env.errors import InputError, unknown_name
 from spikecam_env.names import distinct, file_name
-from spikecam_env.renamed import old_names
 from spikecam_env.run_folder import run_folder
 from spikecam_env.sensor import Keyframes, SensorModel, SpikeSensor
 from spikecam_env.streams.packing import packed_bytes
@@ -248,6 +247,3 @@ def _same_simulation(target: Path, model: SensorModel, plan: dict[str, Any]) -> 
         )
     except InputError:
         return False
-
-
-__getattr__ = old_names(__name__, {"Take": "PlannedRecording"})

@@ -23,7 +23,7 @@ from spikecam_env.sensor.light import (
     check_radiance,
     light_values,
     segments,
-    warn_beside,
+    warn_outside,
 )
 from spikecam_env.sensor.model import SensorModel, generator
 from spikecam_env.types import Floats, Masks, Pictures
@@ -219,23 +219,26 @@ class SpikeSensorBatch:
     def _moving(self, lights: Sequence[Keyframes | Pictures], frames: int) -> Iterator[cuda.BatchSegment]:
         for light, at in zip(lights, self.frame, strict=False):
             if not any(light is film for film in self._films):
-                warn_beside(light, int(at), frames)
+                warn_outside(light, int(at), frames)
         self._films = lights
         films = [segments(light, int(self.frame[b]), frames) for b, light in enumerate(lights)]
         for cut in cut_alike(films):
-            seen = [imaging.seen(_on_host(s)) if imaging else s for imaging, s in zip(self._imaging, cut, strict=False)]
-            yield cuda.BatchSegment.of(seen, self.device)
+            images = [
+                imaging.segment_image(_on_host(s)) if imaging else s
+                for imaging, s in zip(self._imaging, cut, strict=False)
+            ]
+            yield cuda.BatchSegment.of(images, self.device)
 
     def _still(self, pictures: torch.Tensor, frames: int) -> Iterator[cuda.BatchSegment]:
-        """pictures: (B, H, W) or (1, H, W) float32."""
+        """Segments of held light (B, H, W) or (1, H, W)."""
         light = pictures.reshape(len(pictures), -1)
         if any(self._imaging):
-            light = torch.from_numpy(self._seen(light.cpu().numpy()))
+            light = torch.from_numpy(self._images(light.cpu().numpy()))
         light = light.to(self.device)
         for done in range(0, frames, MAX_SEGMENT):
             yield cuda.BatchSegment.held(light, min(MAX_SEGMENT, frames - done))
 
-    def _seen(self, light: Pictures) -> Pictures:
+    def _images(self, light: Pictures) -> Pictures:
         """Held light (B, P) or (1, P) through each camera's optics."""
         if not self._alike:
             light = np.broadcast_to(light, (len(self), light.shape[1]))

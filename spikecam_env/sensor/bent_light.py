@@ -50,11 +50,7 @@ def check_bent(
     """Refuse light in which an effect is off by too much.
 
     Args:
-        light: of the frames.
-        start: first frame.
-        frames: how many.
         first: as given to an engine's `start`.
-        effects: that act from frame to frame.
         image: the optics, a function of a picture (H*W,).
 
     Raises:

@@ -74,9 +74,6 @@ def expected_charge(
     The dark part is computed where an effect changes charge or where dark charge is free of noise.
 
     Args:
-        now: the frames.
-        effects: in physical order.
-        memory: of the effects, updated.
         mean: charge by the light law (F or 1, P) [thresholds].
         rise: of that law within each frame, as mean, where `wants_rise`.
         pieces: of the light of one frame that bends within it, where `wants_pieces`.
@@ -93,7 +90,7 @@ def expected_charge(
     light = Charge(whole - below, rise=rise if isinstance(rise, float) else rise.reshape(-1, *now.shape))
     dark = Charge(below)
     for effect in acting:
-        if pieces and asks_for_pieces(effect):
+        if pieces and acts_on_pieces(effect):
             light, memory[effect.name], pieces = _collect_by_pieces(
                 effect, light, dark, now, memory[effect.name], pieces
             )
@@ -157,10 +154,10 @@ def wants_rise(effects: Sequence[Effect]) -> bool:
 
 def wants_pieces(effects: Sequence[Effect]) -> bool:
     """Whether an effect asks for the pieces of a frame whose light bends."""
-    return any(asks_for_pieces(effect) or effect.overrides("lead") for effect in effects)
+    return any(acts_on_pieces(effect) or effect.overrides("lead") for effect in effects)
 
 
-def asks_for_pieces(effect: Effect) -> bool:
+def acts_on_pieces(effect: Effect) -> bool:
     """Whether an effect acts on light piece by piece; one of the read-out, which sets where frames end, does not."""
     return effect.wants_rise and effect.stage < Stage.READOUT
 

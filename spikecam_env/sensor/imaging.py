@@ -26,7 +26,7 @@ class Imaging:
     def __bool__(self) -> bool:
         return bool(self._optics)
 
-    def seen(self, segment: Segment) -> Segment:
+    def segment_image(self, segment: Segment) -> Segment:
         """Light as it reaches the pixels."""
         if not self._optics:
             return segment

@@ -158,8 +158,6 @@ def real_numbers(values: ArrayLike, name: str, kinds: str) -> NDArray[Any]:
     """An array of real numbers.
 
     Args:
-        values: to be converted.
-        name: of the values, for errors.
         kinds: numpy's letters of allowed types.
 
     Raises:
@@ -188,11 +186,8 @@ def _masks_some(values: Any) -> bool:
     return isinstance(values, np.ma.MaskedArray) and bool(np.ma.is_masked(values))
 
 
-def warn_beside(light: Keyframes | Pictures, start: int, frames: int) -> None:
-    """Warn of a film new to the stream whose keys all lie before or after frames start .. start + frames.
-
-    Keys are on absolute frames: keys that begin at 0 in every call are a likely mistake.
-    """
+def warn_outside(light: Keyframes | Pictures, start: int, frames: int) -> None:
+    """Warn of a film new to the stream whose keys all lie before or after frames start .. start + frames."""
     if not isinstance(light, Keyframes) or light.frame.size < 2 or start == 0:
         return
     first, last = float(light.frame[0]), float(light.frame[-1])
@@ -265,8 +260,6 @@ def segments(light: Keyframes | Pictures, start: int, frames: int, courses: bool
 
     Args:
         light: keyframes, or one (H, W) picture held throughout.
-        start: first frame.
-        frames: how many.
         courses: give frames with keys inside their courses.
     """
     if not isinstance(light, Keyframes):
@@ -296,8 +289,6 @@ def cuts(times: Floats, start: int, stop: int) -> NDArray[np.int64]:
 
     Args:
         times: of the keys (K,) [frames].
-        start: first frame.
-        stop: frame after the last.
 
     Returns:
         (S, 6) int64, a row a segment.  KEY0, KEY1: keys whose pictures are its light at start and end, -1 where no key

@@ -20,7 +20,7 @@ from spikecam_env.types import Floats, Pictures
 Words = tuple[np.uint32, np.uint32]
 """The key of every draw of a field."""
 
-DRAWS = 0x9D0F0548
+DRAWS = 0x98AA1746
 """Checksum of the draws compiled in: numba's cache sees a change of this file, not of those it imports from."""
 
 TILE = 1024
@@ -57,13 +57,10 @@ def octave_field(
     Process j moves in frames that every[j] divides: v <- kept v + sigma sqrt(1 - kept^2) n.
 
     Args:
-        of: the words of each.
         sigma: standard deviation of each.
         value: of each before frame `first` (octaves, H, W).
         every: frames between moves of each.
         kept: autocorrelation of each from move to move.
-        first: number of the first frame.
-        frames: how many.
 
     Returns:
         The sum (frames, H, W), and the values (octaves, H, W) after the last frame.
@@ -92,7 +89,7 @@ def _normal(sigma: float) -> tuple[np.float32, ...]:
 
 @njit(cache=True, nogil=True, error_model="numpy", boundscheck=False)
 def _white(low: np.uint32, high: np.uint32, first: int, polynomial: tuple[np.float32, ...], out: Pictures) -> None:
-    """out: (F, P) float32, overwritten."""
+    """Write a white field to out (F, P)."""
     use_widest_vectors()
     frames, pixels = out.shape
     key = np.empty((2, TILE), np.uint32)
@@ -117,7 +114,7 @@ def _octaves(
     value: Pictures,
     total: Pictures,
 ) -> None:
-    """value: (J, P) float32, updated.  total: (F, P) float32, overwritten.
+    """Write sums of octaves to total (F, P), and update value (J, P).
 
     Slow octaves are summed only when they move: above[j] is the sum of octaves j and slower.
     """

@@ -67,10 +67,7 @@ def check_parameters(owner: Any, name: str) -> None:
 
 
 def range_text(field: dataclasses.Field[Any]) -> str:
-    """The allowed range of a declared field in words, without its unit; empty for a switch.
-
-    It is like `0 .. 1`, `2 .. 1e+12 or inf`, or `this or that`.
-    """
+    """Allowed range of a declared field in words, without its unit, like `2 .. 1e+12 or inf`; empty for a switch."""
     if field.metadata["choices"]:
         return " or ".join(field.metadata["choices"])
     bounds, largest = field.metadata["bounds"], field.metadata["largest"]

@@ -50,8 +50,6 @@ def start(
     """Pixels part-way through a cycle.
 
     Args:
-        first: the first frame.
-        effects: that act from frame to frame.
         phase: (P,) in [0, 1), share of the nominal threshold collected.
         seed: of the temporal noise.
         unit_seed: of draws of effects once a unit, where it is another.
@@ -87,9 +85,6 @@ def step(
     """One frame; returns which pixels report a spike (P,).
 
     Args:
-        now: the frame.
-        effects: that act from frame to frame.
-        state: of the pixels, advanced.
         mean: expected charge (P,) [grains].
         rise: of that charge from the frame's start to its end (P,).
         pieces: of the frame, where its light bends.
@@ -217,9 +212,14 @@ def fire_in_turn(
 ) -> Masks:
     """As `fire`, in the order of the moments at which pixels are at their references, which may move within the frame.
 
-    The charge gained (P,) comes evenly over the frame.  Each spike kicks its neighbours at its moment (`Feedback`).
-    Charge is put on a grid on which sums are the same in any order.  The thresholds after a first reset are drawn for
-    all pixels at once: levels of one pixel take as long to compute as those of all.
+    Each spike kicks its neighbours at its moment (`Feedback`).  Charge is put on a grid on which sums are the same in
+    any order.  The thresholds after a first reset are drawn for all pixels at once: levels of one pixel take as long to
+    compute as those of all.
+
+    Args:
+        mean: expected charge of the frame (P,) [grains].
+        gained: charge of the frame (P,) [grains], evenly over it.
+        law: of the comparators, moving within the frame.
     """
     state.charge, gained = on_grid(state.charge), on_grid(gained)
     state.charge += gained

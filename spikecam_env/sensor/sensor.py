@@ -21,8 +21,7 @@ from spikecam_env.sensor.drive import wants_pieces
 from spikecam_env.sensor.effects.base import ExposureBlock
 from spikecam_env.sensor.imaging import Imaging
 from spikecam_env.sensor.kernels import ahead, block, fast
-from spikecam_env.sensor.kernels.stretches import stretches
-from spikecam_env.sensor.light import Keyframes, Segment, as_light, real_numbers, segments, warn_beside
+from spikecam_env.sensor.light import Keyframes, Segment, as_light, real_numbers, segments, warn_outside
 from spikecam_env.sensor.model import SensorModel, generator
 from spikecam_env.sensor.unit import UNIT_RANGES, Unit
 from spikecam_env.threads import share_out
@@ -194,7 +193,9 @@ class SpikeSensor:
         else:
             self._pixels = reference.start(self._first_exposure(), self._frame_effects, flat, noise_seed, unit_seed)
 
-    def _exposing(self, radiance: Keyframes | ArrayLike, frames: int, out: Spikes | None = None) -> _Exposing:
+    def _step_arguments(
+        self, radiance: Keyframes | ArrayLike, frames: int, out: Spikes | None = None
+    ) -> _StepArguments:
         """The arguments of `step`, checked; nothing is exposed yet."""
         frames = checked_count(frames)
         light = as_light(radiance, self.shape)
@@ -204,23 +205,23 @@ class SpikeSensor:
             bent.check_bent(light, self.frame, frames, self._first_exposure(), self._frame_effects, self._imaging.image)
         spikes = _recycled(out, (frames, *self.shape), light).reshape(frames, -1)
         if light is not self._film:
-            warn_beside(light, self.frame, frames)
+            warn_outside(light, self.frame, frames)
         jumps = self.engine == "fast" and not self._frame_effects
-        return _Exposing(self, light, spikes, jumps and frames > ahead.SHORT_CALL and self._pixels.ready is None)
+        return _StepArguments(self, light, spikes, jumps and frames > ahead.SHORT_CALL and self._pixels.ready is None)
 
-    def _expose(self, given: _Exposing) -> None:
+    def _expose(self, given: _StepArguments) -> None:
         """Expose this camera by itself."""
         light, spikes = given.light, given.spikes
-        seen = map(self._imaging.seen, segments(light, self.frame, len(spikes), self._wants_courses))
+        images = map(self._imaging.segment_image, segments(light, self.frame, len(spikes), self._wants_courses))
         if self.engine == "fast" and self._frame_effects:
-            block.run(self._first_exposure(), self._frame_effects, self._pixels, seen, spikes, threads=self.threads)
+            block.run(self._first_exposure(), self._frame_effects, self._pixels, images, spikes, threads=self.threads)
             return
         done = 0
-        for segment in seen:
+        for segment in images:
             self._run(segment, spikes[done : done + segment.count])
             done += segment.count
 
-    def _exposed(self, given: _Exposing) -> Spikes:
+    def _finish(self, given: _StepArguments) -> Spikes:
         """Count the frames of a finished exposure; returns its spikes (frames, H, W)."""
         self._film = given.light if isinstance(given.light, Keyframes) else None
         self.frame += len(given.spikes)
@@ -241,7 +242,7 @@ class SpikeSensor:
 
 
 @dataclass(frozen=True)
-class _Exposing:
+class _StepArguments:
     """The arguments of `step`, checked."""
 
     sensor: SpikeSensor
@@ -254,7 +255,7 @@ class _Exposing:
     def stretches(self) -> Iterator[fast.Stretch]:
         """Work of the fast engine, 64 frames at a time."""
         sensor = self.sensor
-        return stretches(sensor._pixels.pixels, self.light, sensor.frame, sensor._imaging, self.spikes)
+        return fast.stretches(sensor._pixels.pixels, self.light, sensor.frame, sensor._imaging, self.spikes)
 
 
 def step_together(
@@ -290,14 +291,14 @@ def step_together(
         [8, 16]
     """
     given = [
-        sensor._exposing(radiance, frames, out)
+        sensor._step_arguments(radiance, frames, out)
         for sensor, radiance, out in zip(sensors, radiances, outs or [None] * len(sensors), strict=True)
     ]
     for stretches_now in zip_longest(*(one.stretches() for one in given if one.together)):
         fast.run_together([stretch for stretch in stretches_now if stretch is not None], threads=threads)
     alone = [one for one in given if not one.together]
     share_out(lambda number: alone[number].sensor._expose(alone[number]), len(alone), threads)
-    return [one.sensor._exposed(one) for one in given]
+    return [one.sensor._finish(one) for one in given]
 
 
 def _frame_effects(model: SensorModel) -> str:

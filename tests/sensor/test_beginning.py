@@ -1,4 +1,4 @@
-"""`spikecam effects new`: what it writes is an effect and a test that pass as they stand; nothing is overwritten."""
+"""`spikecam effects new` writes an effect and a test that pass as they stand; nothing is overwritten."""
 
 from __future__ import annotations
 

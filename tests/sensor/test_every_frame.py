@@ -15,7 +15,6 @@ from numpy.typing import NDArray
 from spikecam_env.sensor import Keyframes, SensorModel, SpikeSensor, crossing, decay, random_fields
 from spikecam_env.sensor.compiled_tools import draws
 from spikecam_env.sensor.kernels import block_loop, every_frame, fast, loop
-from spikecam_env.sensor.kernels.stretches import stretches
 from spikecam_env.sensor.light import Segment
 
 MODELS = {
@@ -98,7 +97,7 @@ def test_light_that_changes_often_is_served_frame_by_frame(interval: int, often:
 
     def served(count: int) -> bool:
         room = np.empty((count, 16), np.uint8)
-        (stretch,) = stretches(sensor._pixels.pixels, light, 0, sensor._imaging, room)
+        (stretch,) = fast.stretches(sensor._pixels.pixels, light, 0, sensor._imaging, room)
         return stretch.changes_often
 
     assert served(frames) == often

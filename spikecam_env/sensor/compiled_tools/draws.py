@@ -59,7 +59,9 @@ def bell(counter: Any, key: Any) -> Any:
 def bell_of(word1: Any, word2: Any) -> Any:
     """Eight uniform bytes, summed, over 256, less 4; a ninth byte fills the step between two sums.
 
-    The bytes are those of word2 and word1 + word2, independent: word1 is uniform whatever word2, keyed apart, is.
+    Args:
+        word1: uniform whatever word2 is; its high byte is the ninth.
+        word2: keyed apart; the eight bytes are its own and those of word1 + word2, which are independent.
     """
     fine = _I(_U(_U(byte_sum(word2, _U(word1 + word2)) << _U(8)) | _U(word1 >> _U(24))))
     return _F(fine) * _F(1 / 65536) + _F(0.5 / 65536 + 3.5 / 256 - 4.0)

@@ -22,12 +22,10 @@ def instruction(function: Callable[Concatenate[Any, Given], Any]) -> Callable[Gi
 
 @instruction
 def use_widest_vectors(typing_context: Any) -> Any:
-    """Compile the function that calls this with the processor's widest registers.
+    """Compile the function that calls this with the processor's widest registers."""
 
-    LLVM splits loops to 256 bits where a processor has 512 (`prefer-vector-width`), out of care for old ones that then
-    lowered their clock; where a loop is nothing but vector arithmetic, the full width is a fifth faster.
-    """
-
+    # LLVM splits loops to 256 bits where a processor has 512 (`prefer-vector-width`), out of care for old ones that
+    # then lowered their clock; where a loop is nothing but vector arithmetic, the full width is a fifth faster.
     def mark(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
         # llvmlite's own `add` knows only attributes without a value.
         set.add(builder.function.attributes, '"prefer-vector-width"="512"')
@@ -51,9 +49,11 @@ def take_ticket(typing_context: Any, tickets: Any, row: Any) -> Any:
 
 @instruction
 def pointer_to(typing_context: Any, address: Any, kind: Any) -> Any:
-    """The pointer to numbers of this kind (np.float32, ...) at an address: for `numba.carray`.
+    """The pointer to numbers of this kind (np.float32, ...) at an address, for `numba.carray`.
 
-    So one call takes the arrays of many cameras, as a table of addresses.  Whoever makes the table keeps the arrays.
+    Args:
+        address: from a table, by which one call takes arrays of many cameras; its maker keeps the arrays alive.
+        kind: of the numbers.
     """
     pointer = types.CPointer(kind.dtype)
 

@@ -132,11 +132,6 @@ def run(
     """Advance `state` over segments; writes their spikes to `spikes` (all frames, P) uint8, 0 or 1, and returns it.
 
     Args:
-        first: as given to `start`.
-        effects: as given to `start`.
-        state: of the pixels, advanced.
-        segments: that follow one another.
-        spikes: overwritten.
         threads: default NUMBA_NUM_THREADS.
     """
     done = 0

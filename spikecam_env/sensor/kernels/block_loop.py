@@ -63,7 +63,7 @@ GROUP = 16
 FEWEST_FRAMES, SPARSE = 4, 0.5
 """Fewest frames of a block, and most spikes a pixel and frame, for which going from spike to spike is faster."""
 
-DRAWS, DECAY, CROSSING = 0x9D0F0548, 0xB1E4BA7D, 0xD8275A88
+DRAWS, DECAY, CROSSING = 0x98AA1746, 0xB1E4BA7D, 0xD8275A88
 """Checksums of files compiled in: numba's cache sees a change of this file, not of those it imports from."""
 
 decay = njit(inline="always")(decayed)
@@ -551,7 +551,9 @@ def find_crossings(
 ) -> None:
     """Crossings from moment AT on of the n pixels of a line at place h0 that hit their least limit.
 
-    Rows AT, LIMIT and STANDS get moment, charge and level of the reference; hit is cut to pixels that fire.
+    Args:
+        x: rows AT, LIMIT and STANDS get moment, charge and level of the reference.
+        hit: cut to pixels that fire.
     """
     at, (factor, common) = of_row
     came = 0
@@ -684,10 +686,7 @@ def limit_at(phi: float, factor: float, common: float, of_pixel: PixelNumbers) -
 def next_crossing(
     x: Floats, o: int, j: int, since: float, at: Floats, factor: Floats, common: Floats, of_pixel: PixelNumbers
 ) -> tuple[float, float]:
-    """`crossing.first_crossing` at place j of the scratch that begins at o.
-
-    The charge is at its least limit by the end of the frame; nodes before which it is not are skipped.
-    """
+    """`crossing.first_crossing` at place j of the scratch at o, without the nodes below its least limit."""
     held, gained, phi, least = x[o + _HELD + j], x[o + _ARRIVES + j], x[o + _PHI + j], x[o + _LIMIT + j]
     begin = held - gained
     last = at.size - 1
@@ -789,7 +788,7 @@ def add_left_charge(
 def cross_again(
     x: Floats, words: Words, j: int, end: float, left: float, left_tau: float, reset: Reset, polynomial: Polynomial
 ) -> None:
-    """Reset a pixel that charge left takes to its threshold again, MOST_AGAIN times at most; the law is that of `fire`."""
+    """Reset a pixel that charge left takes to its threshold again, MOST_AGAIN times at most, by the law of `fire`."""
     per_root_rate, per_rate, kept = reset
     rate = x[_ARRIVES + j] / _G
     for _ in range(MOST_AGAIN):
@@ -944,8 +943,9 @@ def after_reset(
 ) -> tuple[float, float]:
     """Charge after a reset [grains], and the electrons of which the next spike has noise [thresholds].
 
-    These are those up to the limit: light that falls while the node is held never reaches it, nor does its noise.
-    Charge of which a part is lost leaves a rest that is known less well.
+    Returns:
+        The charge, and electrons up to the limit: light that falls while the node is held never reaches it, nor does
+            its noise; a part of the charge that is lost leaves a rest that is known less well.
     """
     root, over = math.sqrt(rate), over / _G
     left = ((over - root * per_root_rate) - rate * per_rate) * kept

@@ -71,7 +71,7 @@ from spikecam_env.sensor.light import GRAINS
 AT_ONCE = 4
 """Frames at a time, and charges of each pixel that are ready."""
 
-LOOP = 0x86EC5843
+LOOP = 0x6A460E5D
 """Checksum of `loop.py`, compiled in: numba's cache sees a change of this file, not of those it imports from."""
 
 _U = np.uint32
@@ -97,8 +97,6 @@ def is_chain(pieces: Any, k: Any, stop: Any, known: Any) -> Any:
     """Whether the next AT_ONCE pieces are of one frame each and in a chain: each begins in the light of the last end.
 
     Args:
-        pieces: as of `loop.advance`.
-        k: the next.
         stop: after the camera's last.
         known: address of the light of row LEVEL.
     """

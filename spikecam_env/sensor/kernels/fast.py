@@ -10,7 +10,7 @@ The number of threads (`threads`) changes no bit.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, fields
 from functools import cached_property, partial
 from typing import Any, NamedTuple
@@ -18,11 +18,25 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from spikecam_env.compiled import njit
 from spikecam_env.sensor.compiled_tools.intrinsics import address_of
 from spikecam_env.sensor.compiled_tools.quantile import MIN_ELECTRONS, fitted_polynomial
 from spikecam_env.sensor.effects import Effect
+from spikecam_env.sensor.imaging import Imaging
 from spikecam_env.sensor.kernels import every_frame, loop
-from spikecam_env.sensor.light import GRAINS, Segment
+from spikecam_env.sensor.light import (
+    COUNT,
+    FIRST,
+    GRAINS,
+    KEY0,
+    KEY1,
+    LENGTH,
+    MAX_SEGMENT,
+    Keyframes,
+    Segment,
+    cuts,
+    segments,
+)
 from spikecam_env.sensor.model import generator
 from spikecam_env.sensor.unit import Unit
 from spikecam_env.threads import as_many_as_pay, together
@@ -117,9 +131,7 @@ def start(unit: Unit, phase: Floats, seed: int) -> FastState:
     The first spike's charge is drawn literally: threshold, whole electrons still missing, their Gamma waiting charge.
 
     Args:
-        unit: its law.
         phase: (P,) in [0, 1), share of the nominal threshold collected.
-        seed: of all draws.
     """
     rng = generator(seed, "fast engine: first spike")
     missing_grains = GRAINS * (1.0 + unit.kappa * rng.standard_normal(phase.size)) - np.floor(phase * GRAINS)
@@ -137,8 +149,6 @@ def run(state: FastState, segment: Segment, out: Spikes | None = None, *, thread
     """Advance `state` over a segment.
 
     Args:
-        state: of the pixels, advanced.
-        segment: its light.
         out: (count, P) uint8, C-contiguous, for the spikes.
         threads: default NUMBA_NUM_THREADS.
 
@@ -234,6 +244,66 @@ def _share(jobs: Sequence[tuple[Stretch, NDArray[np.uint8]]], often: bool, packe
     )
     advance = every_frame.advance if often else loop.advance
     together([partial(advance, worker, *work) for worker in range(count)], shared=True)
+
+
+def stretches(
+    state: FastState, light: Keyframes | Pictures, start: int, imaging: Imaging, spikes: Spikes
+) -> Iterator[Stretch]:
+    """The frames from `start` on, as many as there are in spikes (frames, P), through the optics."""
+    if isinstance(light, Keyframes) and not imaging:
+        rows = cuts(light.frame, start, start + len(spikes))
+        pieces = _at_keys(rows, address_of(light.radiance), light.radiance.strides[0])
+        if len(pieces):
+            return _key_stretches(state, light.radiance, pieces, spikes)
+    return _segment_stretches(state, map(imaging.segment_image, segments(light, start, len(spikes))), spikes)
+
+
+def _key_stretches(
+    state: FastState, radiance: Pictures, pieces: NDArray[np.int64], spikes: Spikes
+) -> Iterator[Stretch]:
+    """Stretches between keys at whole frames, whose pictures are not copied."""
+    if len(spikes) <= MAX_SEGMENT:
+        yield Stretch(state, pieces, (radiance,), spikes, spikes.shape[1])
+        return
+    ends = np.cumsum(pieces[:, loop.COUNT])
+    first = done = 0
+    while first < len(pieces):
+        after = int(np.searchsorted(ends, done + MAX_SEGMENT, side="right"))
+        stop = int(ends[after - 1])
+        yield Stretch(state, pieces[first:after], (radiance,), spikes[done:stop], spikes.shape[1])
+        first, done = after, stop
+
+
+@njit(cache=True, nogil=True)
+def _at_keys(rows: NDArray[np.int64], address: int, size: int) -> NDArray[np.int64]:
+    """Rows of `cuts` as pieces of `loop.advance`; none where a row needs a picture that is no key's.
+
+    Args:
+        address: of the first key's picture.
+        size: bytes from one picture to the next.
+    """
+    pieces = np.empty((len(rows), loop.PIECE_COLUMNS), np.int64)
+    for k in range(len(rows)):
+        if rows[k, KEY0] < 0 or rows[k, KEY1] < 0:
+            return pieces[:0]
+        pieces[k, loop.LIGHT0] = address + rows[k, KEY0] * size
+        pieces[k, loop.LIGHT1] = address + rows[k, KEY1] * size
+        pieces[k, loop.LENGTH], pieces[k, loop.FIRST] = rows[k, LENGTH], rows[k, FIRST]
+        pieces[k, loop.COUNT] = rows[k, COUNT]
+    return pieces
+
+
+def _segment_stretches(state: FastState, segments: Iterator[Segment], spikes: Spikes) -> Iterator[Stretch]:
+    """Stretches of pictures that are computed one after another."""
+    waiting: list[Segment] = []
+    done = frames = 0
+    for segment in segments:
+        if frames + segment.count > MAX_SEGMENT:
+            yield Stretch.of(state, waiting, spikes[done : done + frames])
+            waiting, done, frames = [], done + frames, 0
+        waiting.append(segment)
+        frames += segment.count
+    yield Stretch.of(state, waiting, spikes[done : done + frames])
 
 
 def unpack(packed: NDArray[np.uint8], pixels: int, out: Spikes | None = None) -> NDArray[np.uint8]:

@@ -30,7 +30,7 @@ from spikecam_env.sensor.compiled_tools.draws import GOLDEN, bell_of, first_key,
 from spikecam_env.sensor.compiled_tools.intrinsics import pointer_to, take_ticket, use_widest_vectors
 from spikecam_env.sensor.light import GRAINS, MAX_GRAINS_PER_FRAME, MAX_SEGMENT
 
-DRAWS = 0x9D0F0548
+DRAWS = 0x98AA1746
 """Checksum of the draws compiled in: numba's cache sees a change of this file, not of those it imports from."""
 
 TILE = 256
@@ -208,11 +208,6 @@ def jump(s: Any, f: Any, live: Any, groups: Any, polynomial: Any, first: Any) ->
     """Let each live pixel fire in the frame of its crossing; returns how many groups stay live.
 
     Args:
-        s: scratch, as int32.
-        f: the same as float32.
-        live: starts of live groups.
-        groups: how many.
-        polynomial: law of a spike's charge.
         first: frame of the key interval of bit 0.
     """
     for i in range(groups):

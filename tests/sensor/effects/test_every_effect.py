@@ -1,4 +1,4 @@
-"""What every effect of the catalogue owes, by its declaration alone."""
+"""Duties of every effect of the catalogue, by its declaration alone."""
 
 from __future__ import annotations
 
@@ -140,7 +140,7 @@ def test_hooks_change_nothing_in_place_and_keep_shapes(name: str) -> None:
         number += frames
 
 
-def test_what_a_few_pixels_get_is_as_if_all_were_written_out() -> None:
+def test_charge_of_a_few_pixels_is_as_if_all_were_written_out() -> None:
     """Beside charge that stays it is kept apart; beside charge that moves, or that others get too, it is added."""
     rng, frames = np.random.default_rng(0), 3
     still, moving = rng.random((1, *SHAPE)), rng.random((frames, *SHAPE))
@@ -154,14 +154,6 @@ def test_what_a_few_pixels_get_is_as_if_all_were_written_out() -> None:
     assert np.array_equal(apart.plus(few).values, still + besides + besides)
     assert np.array_equal(Charge(moving).plus(few).values, moving + besides)
     assert np.array_equal(Charge(still, factor).plus(few).values, still * factor + besides)
-
-
-def test_state_of_a_model_with_other_effects_is_refused() -> None:
-    state = camera("crosstalk", SHAPE, engine="reference").state()
-    with pytest.raises(InputError, match=r"other frame effects \(crosstalk\); this one has dead_time"):
-        camera("dead_time", SHAPE, engine="reference").restore(state)
-    with pytest.raises(InputError, match="this one has none"):
-        SpikeSensor("ideal", SHAPE, engine="reference").restore(state)
 
 
 def test_all_effects_at_once_are_one_stream_however_cut() -> None:
@@ -188,13 +180,6 @@ def test_fast_engine_gives_the_bits_of_the_reference_without_noise(name: str, li
     np.testing.assert_array_equal(fast, reference)
 
 
-def test_clean_twin_has_no_effects() -> None:
-    sensor = SpikeSensor(with_effects("scsim", *(e() for e in CATALOGUE.values())), SHAPE, 4, "auto")
-    assert sensor.clean_twin().model.effects == ()
-    ideal = SpikeSensor("ideal", SHAPE, 4, "reference").step(moving_light(), FRAMES)
-    np.testing.assert_array_equal(sensor.clean_twin().step(moving_light(), FRAMES), ideal)
-
-
 @pytest.mark.parametrize("name", EVERY)
 def test_is_documented(name: str) -> None:
     effect = CATALOGUE[name]
@@ -206,19 +191,6 @@ def test_is_documented(name: str) -> None:
     assert sheet.sections.get("Within a frame", "").startswith(effect.acts.value)
     if "Twins" in sheet.sections:
         assert sheet.twins and name not in sheet.twins
-
-
-@pytest.mark.parametrize("name", EVERY)
-def test_is_bounded(name: str) -> None:
-    effect = CATALOGUE[name]
-    bounds = {f.name: f.metadata["bounds"] for f in fields(effect) if f.metadata["bounds"]}
-    low, high = bounds[effect.strength]
-    assert low <= effect.neutral <= high
-    for parameter, (low, high) in bounds.items():
-        for bad in (low - 1, high + 1, float("nan"), "much"):
-            if bad != math.inf:
-                with pytest.raises(InputError, match=f"{name}.{parameter}"):
-                    effect(**{parameter: bad})
 
 
 @pytest.mark.parametrize("name, parameter", [("afterpulsing", "delay_frames"), ("threshold_flicker_noise", "octaves")])

@@ -31,8 +31,6 @@ def run(state: BatchState, segment: BatchSegment, out: torch.Tensor | None = Non
     """Advance `state` over a segment.
 
     Args:
-        state: of the pixels, advanced.
-        segment: its light.
         out: (B, count, P) uint8 on the state's device, any strides over cameras and frames, pixels adjoining.
 
     Returns:
