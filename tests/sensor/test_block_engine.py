@@ -19,7 +19,7 @@ from spikecam_env.sensor.effects.base import Charge, ExposureBlock, parameter
 from spikecam_env.sensor.kernels import block, block_loop
 from spikecam_env.sensor.light import Segment
 from spikecam_env.sensor.model import generator
-from spikecam_env.sensor.random_fields import octave_field, white_field, words
+from spikecam_env.sensor.random_fields import white_field, words
 from spikecam_env.types import Floats, Masks
 
 pytestmark = pytest.mark.slow
@@ -263,16 +263,3 @@ def test_white_field_is_normal_and_independent_from_pixel_to_pixel_and_frame_to_
         print(f"{name}: {value:.5f}, expected {expected:g} +- {np.sqrt(variance / n):.5f}")
         assert abs(value - expected) < 4.5 * np.sqrt(variance / n)
     np.testing.assert_array_equal(white_field(of, 1.0, 11, 3, (100, 100)), field[6:9].astype(np.float32))
-
-
-def test_octave_field_keeps_unit_variance_and_its_correlation() -> None:
-    rng = np.random.default_rng(0)
-    value = rng.standard_normal((1, 50, 400), dtype=np.float32)
-    every, kept = np.array([4.0]), np.array([0.8])
-    total, last = octave_field([words(rng)], 1.0, value, every, kept, 0, 21)
-    np.testing.assert_array_equal(total[-1], last[0])
-    assert np.array_equal(total[0], total[3]) and not np.array_equal(total[3], total[4])
-    for name, one, expected in (("variance", total[20], 1.0), ("5 moves apart", total[1], 0.8**5)):
-        product = (one * total[20]).mean()
-        print(f"{name}: {product:.4f}, expected {expected:.4f}")
-        assert abs(product - expected) < 4.5 * np.sqrt(2 / value.size)

@@ -104,16 +104,9 @@ def test_a_region_of_a_camera_is_that_camera_cut_out() -> None:
 
 
 @pytest.mark.parametrize("pixels", [1, 7, 63, 64, 65, 256, 257, 1000])
-def test_packed_frames_are_the_bytes_of_a_dat_file(pixels: int) -> None:
-    light = wild_light(pixels)
-    segment = Segment(light[0], light[1], 64, 0, 64)
-    packed = fast.run_packed(started(pixels), segment)
-    spikes = fast.run(started(pixels), segment)
-    assert spikes.shape == (64, pixels)
-    assert np.array_equal(packed, np.packbits(spikes, axis=1, bitorder="little"))
-    out = np.empty((64, pixels), dtype=np.uint8)
-    assert fast.run(started(pixels), segment, out) is out
-    assert np.array_equal(out, spikes)
+def test_frames_by_ones_are_those_of_one_call_for_any_number_of_pixels(pixels: int) -> None:
+    light, one, other = wild_light(pixels)[:1], *(SpikeSensor("scsim", (1, pixels), 3) for _ in range(2))
+    assert np.array_equal(one.step(light, 64), np.concatenate([other.step(light) for _ in range(64)]))
 
 
 def test_an_already_passed_threshold_fires_in_the_first_lit_frame() -> None:

@@ -20,24 +20,18 @@ def polynomial_at(x: NDArray[np.float64], electrons: float, kappa: float) -> NDA
     return np.polynomial.polynomial.polyval(x, np.array(fitted_polynomial(electrons, kappa), dtype=np.float64))
 
 
-@pytest.mark.parametrize("electrons", [20.0, 50.0, 5000.0, 50_000.0])
-def test_law_without_reset_noise_is_gamma(electrons: float) -> None:
-    z = np.linspace(-4, 5, 200)
-    exact = special.gammainc(electrons, electrons + np.sqrt(electrons) * z)
-    error = np.abs(charge_cdf(z, electrons, 0.0) - exact).max()
-    print(f"N = {electrons:g}: {error:.1e}")
-    assert error < 1e-9
-
-
-@pytest.mark.parametrize(("electrons", "kappa"), [(50.0, 0.05), (500.0, 0.0072), (50_000.0, 0.0058)])
-def test_law_with_reset_noise_is_the_gamma_law_averaged_over_thresholds(electrons: float, kappa: float) -> None:
+@pytest.mark.parametrize(
+    ("electrons", "kappa"),
+    [*((n, 0.0) for n in (20.0, 50.0, 5000.0, 50_000.0)), (50.0, 0.05), (500.0, 0.0072), (50_000.0, 0.0058)],
+)
+def test_law_is_the_gamma_law_averaged_over_thresholds(electrons: float, kappa: float) -> None:
     nodes, weights = np.polynomial.hermite_e.hermegauss(80)
     z = np.linspace(-4, 5, 100)
     charge = electrons * (1 + np.sqrt(1 / electrons + kappa**2) * z)
     mixture = special.gammainc(electrons * (1 + kappa * nodes), charge[:, None]) @ (weights / weights.sum())
     error = np.abs(charge_cdf(z, electrons, kappa) - mixture).max()
     print(f"N = {electrons:g}, kappa = {kappa:g}: {error:.1e}")
-    assert error < 1e-8
+    assert error < (1e-8 if kappa else 1e-9)
 
 
 OUTLYING = [(np.inf, 0.0058, 1e-5), (1e9, 0.0, 1e-5), (1e9, 0.0001, 1e-5), (20.0, 0.0, 2e-5)]

@@ -237,19 +237,27 @@ def test_parameters_are_held_to_their_ranges_where_an_effect_makes_itself(tmp_pa
             grey(loss=0.5)
 
 
+DRAW_NOTHING = ("supply_ripple", "optical_blur", "vignetting", "photodiode_lag", "blooming", "readout_skew",
+                "dead_time", "comparator_delay", "synchronous_reset", "incomplete_reset", "crosstalk", "ir_drop",
+                "light_flicker", "clock_feedthrough", "photo_response_nonlinearity", "dark_current_drift")  # fmt: skip
+
+
 @pytest.mark.parametrize("base", ["ideal", "scsim"])
-@pytest.mark.parametrize("engine", ["reference", "fast"])
+@pytest.mark.parametrize("engine", ["reference", "auto"])
 def test_a_checked_law_gives_the_bits_of_the_same_law_unchecked(base: str, engine: str, tmp_path: Path) -> None:
-    """A shipped effect as a user's own, under another name: the check hands on the values of the law."""
+    """Every shipped effect as a user's own, under another name: it changes no array in place, and keeps shapes.
+
+    The check hands on the values of the law; of effects that draw, another name draws other numbers.
+    """
     light = np.random.default_rng(0).uniform(0.0, 1.5, SHAPE)
-    for name in ("supply_ripple", "optical_blur", "vignetting", "photodiode_lag", "blooming", "readout_skew"):
-        shipped = CATALOGUE[name]
+    for name, shipped in CATALOGUE.items():
         text = Path(inspect.getsourcefile(shipped)).read_text(encoding="utf-8")
         file = tmp_path / f"own_{name}.py"
         file.write_text(text.replace(f"class {shipped.__name__}", f"class {shipped.__name__}s"), encoding="utf-8")
         with effects_from(file) as [own]:
             spikes = [_spikes(SensorModel.preset(base).with_effect(e()), light, engine) for e in (shipped, own)]
-        np.testing.assert_array_equal(*spikes, err_msg=name)
+        if name in DRAW_NOTHING:
+            np.testing.assert_array_equal(*spikes, err_msg=name)
 
 
 def _spikes(model: SensorModel, light: np.ndarray, engine: str) -> np.ndarray:

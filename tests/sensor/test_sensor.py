@@ -95,8 +95,6 @@ def test_auto_takes_the_fast_engine_where_it_carries_the_model() -> None:
     assert SpikeSensor("scsim", SHAPE, engine="auto").engine == "fast"
     lossy = SensorModel.preset("scsim").with_effect(CATALOGUE["dead_time"]())
     assert SpikeSensor(lossy, SHAPE, engine="auto").engine == "fast"
-    with pytest.raises(InputError, match="cuda engine does not carry dead_time"):
-        SpikeSensor(lossy, SHAPE, engine="cuda")
     with pytest.raises(InputError, match="dark_is_noisy"):
         SpikeSensor(
             SensorModel.preset("ideal").with_effect(CATALOGUE["shot_noise"](dark_is_noisy=False)), SHAPE, engine="fast"
@@ -240,19 +238,6 @@ def test_ramps_that_stand_still_are_light_that_stays(name: str) -> None:
     whole = SpikeSensor(model, SHAPE, 1, "reference").step(light, 120)
     for cuts in ([120], [1] * 90 + [30], [7] * 15 + [15]):
         np.testing.assert_array_equal(stream(SpikeSensor(model, SHAPE, 1), light, cuts), whole)
-
-
-def test_optics_act_once_a_key_and_not_once_a_step(monkeypatch) -> None:
-    blur, calls = CATALOGUE["optical_blur"], []
-    image = blur.image
-    monkeypatch.setattr(blur, "image", lambda self, picture: (calls.append(1), image(self, picture))[1])
-    sensor = SpikeSensor(SCSIM.with_effect(blur(sigma_pixels=1.0)), SHAPE, 1)
-    for _ in range(64):
-        sensor.step(moving_light(16))
-    assert len(calls) == 64 // 16 + 1
-    for _ in range(9):
-        sensor.step(np.full(SHAPE, 0.3, np.float32))
-    assert len(calls) == 64 // 16 + 2
 
 
 @pytest.mark.parametrize("engine", ENGINES)

@@ -74,6 +74,9 @@ def test_every_picture_of_a_film_goes_through_the_lens_once(engine, monkeypatch)
     for frames in (3, 6, 11):
         assert np.array_equal(one.step(film, frames), other.step(blurred, frames))
     assert len(seen) == 6
+    for _ in range(9):
+        one.step(np.full((8, 9), 0.3, np.float32))
+    assert len(seen) == 7
 
 
 def test_optical_blur_leaves_flat_light_alone() -> None:
