@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from spikecam_env.checked import checked_memory
 from spikecam_env.compiled import njit
-from spikecam_env.sensor.kernels.intrinsics import pointer_to, take_ticket, two_at, use_widest_vectors
+from spikecam_env.sensor.compiled_tools.intrinsics import pointer_to, take_ticket, two_at, use_widest_vectors
 
 TEXELS_PER_PIXEL = 5
 """Of the prefiltered texture.  At a key the default disk is 0.75 % rms of full scale off 16 x 16 supersampling at 5,

@@ -19,7 +19,7 @@ from scenes.keys import threads_for
 from scenes.painted_disk import Texels, paint_scenes, parts_of, places_of
 from scenes.protocol import Gaze
 from spikecam_env.sensor import Keyframes
-from spikecam_env.sensor.kernels.intrinsics import address_of
+from spikecam_env.sensor.compiled_tools.intrinsics import address_of
 from spikecam_env.threads import together
 
 

@@ -29,10 +29,10 @@ BOUND_BY_MODES = ["setpriv", "--bounding-set=-dac_override,-dac_read_search", "-
 
 USES_A_KERNEL = """
 import numpy as np
-from spikecam_env.sensor.kernels import ahead
+from spikecam_env.sensor import light
 a = np.ones(5, np.float32)
-assert ahead.same_light(a, a)
-print(sum(ahead._same_words.stats.cache_hits.values()), "from the cache")
+assert light.same_light(a, a)
+print(sum(light._same_words.stats.cache_hits.values()), "from the cache")
 """
 
 
@@ -77,7 +77,7 @@ def test_a_read_only_package_without_a_home_runs_and_keeps_what_it_compiles(read
     assert run(read_only, "-c", USES_A_KERNEL) == "1 from the cache\n"
     kept = read_only / "tmp" / f"spikecam-env-{os.getuid()}"
     assert stat.S_IMODE(kept.stat().st_mode) == 0o700
-    assert list(kept.rglob("ahead._same_words*.nbc"))
+    assert list(kept.rglob("light._same_words*.nbc"))
 
 
 @pytest.fixture

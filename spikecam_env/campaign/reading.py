@@ -1,4 +1,4 @@
-"""A measurement campaign: a folder of recordings with what the camera was shown, read and checked.
+"""A measurement campaign: a folder of recordings and of the light that the camera saw, read and checked.
 
 campaign.json, format `spikecam-campaign/1` (docs/calibration.md):
 
@@ -29,6 +29,7 @@ from spikecam_env.names import distinct, file_name, inside
 from spikecam_env.sensor import Keyframes
 from spikecam_env.sensor.model import FRAME_RATES_HZ
 from spikecam_env.streams.packing import packed_bytes, unpack_frames
+from spikecam_env.types import Floats, Spikes
 from spikecam_env.untrusted import (
     Count,
     Declared,
@@ -51,16 +52,14 @@ USES = ("fit", "holdout")
 class CampaignRecording:
     """One recording: a stream of spikes in a file, or only the rates of its pixels.
 
-    frames: length.  spikes, rates: one of them is a path.  radiance: path, or None for an unknown static scene.
-    v_d: V_D - V_ref [V] at which it was taken, or None.  temperature_k: [K], or None.
-
-    >>> from spikecam_env.sensor import Keyframes, SensorModel
-    >>> light = Keyframes(np.array([0.0]), np.full((1, 1, 1), 0.25, np.float32))
-    >>> flats = [PlannedRecording("flat", light, 80)]
-    >>> campaign = record_takes("camera", SensorModel.preset("ideal"), flats, shape=(2, 4))
-    >>> flat = campaign.recordings[0]
-    >>> float(flat.load().mean()), float(flat.static_radiance().mean())
-    (0.25, 0.25)
+    Example:
+        >>> from spikecam_env.sensor import Keyframes, SensorModel
+        >>> light = Keyframes(np.array([0.0]), np.full((1, 1, 1), 0.25, np.float32))
+        >>> flats = [PlannedRecording("flat", light, 80)]
+        >>> campaign = record_takes("camera", SensorModel.preset("ideal"), flats, shape=(2, 4))
+        >>> flat = campaign.recordings[0]
+        >>> float(flat.load().mean()), float(flat.static_radiance().mean())
+        (0.25, 0.25)
     """
 
     name: str
@@ -68,14 +67,17 @@ class CampaignRecording:
     frames: int
     spikes: Path | None
     rates: Path | None
+    """Of `spikes` and `rates` one is a path."""
     radiance: Path | None
+    """None for an unknown static scene."""
     use: str = "fit"
     v_d: float | None = None
+    """V_D - V_ref [V]."""
     temperature_k: float | None = None
     note: str = ""
 
     def light(self) -> Keyframes | None:
-        """What the camera was shown; None where that is unknown."""
+        """The light that the camera saw; None where it is unknown."""
         if self.radiance is None:
             return None
         where = f"recording {self.name!r}"
@@ -89,7 +91,7 @@ class CampaignRecording:
                 f"unusable for {self.shape} pixels: {error}"
             ) from error
 
-    def static_radiance(self) -> NDArray[np.float64] | None:
+    def static_radiance(self) -> Floats | None:
         """(H, W) radiance, or None where it is unknown or changes during the recording."""
         light = self.light()
         if light is None or np.any(light.radiance != light.radiance[0]):
@@ -97,35 +99,33 @@ class CampaignRecording:
         return np.asarray(light.radiance[0].astype(np.float64))
 
     def packed(self) -> NDArray[np.uint8]:
-        """(frames, ceil(H W / 8)) uint8 bits of the stream, mapped from the file; raises InputError for rates only."""
-        return np.memmap(self._stream(), np.uint8, "r", shape=(self.frames, packed_bytes(self.shape)))
+        """(frames, ceil(H W / 8)) uint8 bits of the stream, mapped from the file; InputError for rates only."""
+        if self.spikes is None:
+            raise InputError(f"recording {self.name!r} holds rates only, no spikes; read it with rate()")
+        return np.memmap(self.spikes, np.uint8, "r", shape=(self.frames, packed_bytes(self.shape)))
 
-    def load(self) -> NDArray[np.uint8]:
-        """(frames, H, W) uint8 spikes; raises InputError for rates only."""
+    def load(self) -> Spikes:
+        """(frames, H, W) uint8 spikes; InputError for rates only."""
         return unpack_frames(np.asarray(self.packed()), self.shape)
 
-    def rate(self) -> NDArray[np.float64]:
+    def rate(self) -> Floats:
         """(H, W) measured rates of a recording that is rates only [spikes/frame]."""
         if self.rates is None:
             raise InputError(f"recording {self.name!r} is a stream of spikes; read it with load() or packed()")
         return _rates(self.rates, self.name, self.shape)[0]
-
-    def _stream(self) -> Path:
-        if self.spikes is None:
-            raise InputError(f"recording {self.name!r} holds rates only; its spikes are not there")
-        return self.spikes
 
 
 @dataclass(frozen=True)
 class Campaign:
     """A folder of recordings of one camera; `read_campaign` makes it.
 
-    >>> from spikecam_env.sensor import Keyframes, SensorModel
-    >>> light = Keyframes(np.array([0.0]), np.full((1, 1, 1), 0.25, np.float32))
-    >>> flats = [PlannedRecording("flat", light, 80)]
-    >>> campaign = record_takes("camera", SensorModel.preset("ideal"), flats, shape=(2, 4))
-    >>> campaign.shape, [recording.name for recording in campaign.recordings]
-    ((2, 4), ['flat'])
+    Example:
+        >>> from spikecam_env.sensor import Keyframes, SensorModel
+        >>> light = Keyframes(np.array([0.0]), np.full((1, 1, 1), 0.25, np.float32))
+        >>> flats = [PlannedRecording("flat", light, 80)]
+        >>> campaign = record_takes("camera", SensorModel.preset("ideal"), flats, shape=(2, 4))
+        >>> campaign.shape, [recording.name for recording in campaign.recordings]
+        ((2, 4), ['flat'])
     """
 
     folder: Path
@@ -163,15 +163,20 @@ class _CampaignFile(Declared):
 def read_campaign(folder: str | Path, *, outside: bool = False) -> Campaign:
     """Read and check a campaign.
 
-    outside: read files that lie outside of the folder too, by `..`, from the root, or over symbolic links.
-    Raises InputError that names the recording for anything missing or contradictory.
+    Args:
+        folder: with campaign.json in it.
+        outside: read files that lie outside of the folder too, by `..`, from the root, or over symbolic links.
 
-    >>> from spikecam_env.sensor import Keyframes, SensorModel
-    >>> light = Keyframes(np.array([0.0]), np.full((1, 1, 1), 0.25, np.float32))
-    >>> flats = [PlannedRecording("flat", light, 80)]
-    >>> recorded = record_takes("camera", SensorModel.preset("ideal"), flats, shape=(2, 4))
-    >>> read_campaign("camera") == recorded
-    True
+    Raises:
+        InputError: for anything missing or contradictory; it names the recording.
+
+    Example:
+        >>> from spikecam_env.sensor import Keyframes, SensorModel
+        >>> light = Keyframes(np.array([0.0]), np.full((1, 1, 1), 0.25, np.float32))
+        >>> flats = [PlannedRecording("flat", light, 80)]
+        >>> recorded = record_takes("camera", SensorModel.preset("ideal"), flats, shape=(2, 4))
+        >>> read_campaign("camera") == recorded
+        True
     """
     root = Path(folder)
     path = root / "campaign.json"
@@ -186,10 +191,11 @@ def read_campaign(folder: str | Path, *, outside: bool = False) -> Campaign:
     return Campaign(root, shape, file.camera.frame_rate_hz, recordings)
 
 
-def read_light(path: Path, where: str) -> tuple[NDArray[np.float64], NDArray[Any]]:
+def read_light(path: Path, where: str) -> tuple[Floats, NDArray[Any]]:
     """Light over time, frame (K,) and radiance as they are stored in an npz of these names.
 
-    Raises InputError for other arrays, and radiance that is no number, negative or larger than float32 holds.
+    Raises:
+        InputError: for other arrays, and for radiance that is no number, negative or larger than float32 holds.
     """
     where = f"{where}: {path.name}"
     arrays = read_arrays(path, ("frame", "radiance"))
@@ -202,10 +208,11 @@ def read_light(path: Path, where: str) -> tuple[NDArray[np.float64], NDArray[Any
     return frame, radiance
 
 
-def read_rates(path: Path, where: str) -> tuple[NDArray[np.float64], int]:
+def read_rates(path: Path, where: str) -> tuple[Floats, int]:
     """Rates (H, W) [spikes/frame] and the frames they were counted over, from an npz of `rate` and `frames`.
 
-    Raises InputError for other arrays, and for rates that are not 0 to 1.
+    Raises:
+        InputError: for other arrays, and for rates that are not 0 to 1.
     """
     where = f"{where}: {path.name}"
     arrays = read_arrays(path, ("rate", "frames"))
@@ -258,7 +265,7 @@ def _file(root: Path, name: str, key: str, text: str | None, outside: bool) -> P
     return path
 
 
-def _rates(path: Path, name: str, shape: tuple[int, int]) -> tuple[NDArray[np.float64], int]:
+def _rates(path: Path, name: str, shape: tuple[int, int]) -> tuple[Floats, int]:
     rate, frames = read_rates(path, f"recording {name!r}")
     if rate.shape != shape:
         raise InputError(f"recording {name!r}: rate in {path.name} is {rate.shape}, the camera {shape}")

@@ -1,10 +1,9 @@
-"""Takes: one unit of a model recorded again and again, under light that is known, into a campaign.
+"""Simulated campaigns: one unit of a model records several times, each time in known light.
 
-Every take has its own starting phase and temporal noise; the unit, its fixed pattern, is the same in all.
+Every recording, or take, has its own starting phase and temporal noise.  The unit, its fixed pattern, is the same.
 
 A folder holds `model.toml` and `simulation.json` from the start: its model, and the plan of its recordings.
-Recordings of the same settings that are there already are kept, so a run that was stopped goes on where it was;
-`campaign.json` comes last.
+Existing recordings of the same settings are kept, so a stopped run goes on where it was; `campaign.json` comes last.
 """
 
 from __future__ import annotations
@@ -18,7 +17,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from tqdm import tqdm
 
 from spikecam_env.campaign.reading import USES, Campaign, read_campaign
@@ -26,10 +24,10 @@ from spikecam_env.campaign.writing import finish_campaign, save_light, save_spik
 from spikecam_env.checked import checked_count, checked_seed, checked_shape
 from spikecam_env.errors import InputError, unknown_name
 from spikecam_env.names import distinct, file_name
-from spikecam_env.renamed import old_names
 from spikecam_env.run_folder import run_folder
 from spikecam_env.sensor import Keyframes, SensorModel, SpikeSensor
 from spikecam_env.streams.packing import packed_bytes
+from spikecam_env.types import Spikes
 from spikecam_env.untrusted import read_json
 from spikecam_env.version import __version__
 from spikecam_env.whole import write_text_whole
@@ -44,21 +42,22 @@ _BLOCK = 2_000_000
 class PlannedRecording:
     """One recording to be made.
 
-    name: of its files.  light: keys whose radiance is (K, H, W) or broadcasts to it.  use: fit or holdout.
-    v_d: V_D - V_ref [V]; None is the model's own.  The light is the same at any v_d: 1.0 makes the nominal pixel of the
-    model's own v_d fire once a frame.
-
-    >>> from spikecam_env.sensor import Keyframes
-    >>> flat = PlannedRecording("flat", Keyframes(np.array([0.0]), np.full((1, 1, 1), 0.25, np.float32)), frames=80)
-    >>> flat.use, flat.frames
-    ('fit', 80)
+    Example:
+        >>> from spikecam_env.sensor import Keyframes
+        >>> flat = PlannedRecording("flat", Keyframes(np.array([0.0]), np.full((1, 1, 1), 0.25, np.float32)), frames=80)
+        >>> flat.use, flat.frames
+        ('fit', 80)
     """
 
     name: str
+    """Of its files."""
     light: Keyframes
+    """Radiance (K, H, W), or broadcast to it."""
     frames: int
     use: str = "fit"
+    """fit or holdout."""
     v_d: float | None = None
+    """V_D - V_ref [V]; None is the model's own, at which light of 1.0 makes the nominal pixel fire once a frame."""
     note: str = ""
 
 
@@ -76,15 +75,27 @@ def record_takes(
 
     Same arguments, same bytes.  A folder that a stopped run left unfinished is completed; a finished campaign of the
     same settings is returned as it is.
-    Errors: InputError for no takes, names that repeat or are no file names, an unknown use, light of another shape, a
-    v_d that leaves no threshold, and a folder of other settings, or in which another run is at work.
 
-    >>> from spikecam_env.sensor import Keyframes, SensorModel
-    >>> light = Keyframes(np.array([0.0]), np.full((1, 1, 1), 0.25, np.float32))
-    >>> flats = [PlannedRecording("flat", light, 80)]
-    >>> campaign = record_takes("camera", SensorModel.preset("ideal"), flats, shape=(2, 4))
-    >>> int(campaign.recordings[0].load().sum())
-    160
+    Args:
+        folder: new, empty, or of the same settings.
+        model: of the camera.
+        takes: recordings to make.
+        shape: (rows, columns).
+        seed: of the unit and of all noise.
+        engine: as of `SpikeSensor`.
+        progress: show a bar.
+
+    Raises:
+        InputError: for no takes, repeated or bad names, an unknown use, light of another shape, or a v_d that leaves
+            no threshold; and for a folder of other settings, or of a run at work.
+
+    Example:
+        >>> from spikecam_env.sensor import Keyframes, SensorModel
+        >>> light = Keyframes(np.array([0.0]), np.full((1, 1, 1), 0.25, np.float32))
+        >>> flats = [PlannedRecording("flat", light, 80)]
+        >>> campaign = record_takes("camera", SensorModel.preset("ideal"), flats, shape=(2, 4))
+        >>> int(campaign.recordings[0].load().sum())
+        160
     """
     shape, seed = checked_shape(shape), checked_seed(seed)
     _check(takes, shape)
@@ -117,9 +128,10 @@ def record_takes(
 def at_v_d(model: SensorModel, v_d: float) -> SensorModel:
     """The same camera with its reset voltage set so that V_D - V_ref = v_d [V]: fewer or more electrons a spike.
 
-    >>> from spikecam_env.sensor import SensorModel
-    >>> round(at_v_d(SensorModel.preset("scsim"), 0.9).circuit.reset_V, 3)
-    3.1
+    Example:
+        >>> from spikecam_env.sensor import SensorModel
+        >>> round(at_v_d(SensorModel.preset("scsim"), 0.9).circuit.reset_V, 3)
+        3.1
     """
     try:
         circuit = replace(model.circuit, reset_V=model.circuit.reference_V + v_d)
@@ -147,7 +159,7 @@ def light_during(light: Keyframes, start: int, stop: int, shape: tuple[int, int]
     return Keyframes(light.frame[first : last + 1], np.broadcast_to(radiance, (len(radiance), *shape)))
 
 
-def _stream(sensor: SpikeSensor, take: PlannedRecording, scale: float, bar: tqdm) -> Iterator[NDArray[np.uint8]]:
+def _stream(sensor: SpikeSensor, take: PlannedRecording, scale: float, bar: tqdm) -> Iterator[Spikes]:
     block = max(64, _BLOCK // (sensor.shape[0] * sensor.shape[1]) // 64 * 64)
     for start in range(0, take.frames, block):
         count = min(block, take.frames - start)
@@ -230,10 +242,8 @@ def _claim(target: Path, model: SensorModel, plan: dict[str, Any]) -> None:
 
 def _same_simulation(target: Path, model: SensorModel, plan: dict[str, Any]) -> bool:
     try:
-        found = read_json(target / "simulation.json")
-        return bool(found == plan and SensorModel.from_toml(target / "model.toml") == model)
+        return bool(
+            read_json(target / "simulation.json") == plan and SensorModel.from_toml(target / "model.toml") == model
+        )
     except InputError:
         return False
-
-
-__getattr__ = old_names(__name__, {"Take": "PlannedRecording"})

@@ -42,7 +42,7 @@ def save_rates(path: Path, rate: NDArray[np.floating], frames: int) -> None:
 def finish_campaign(
     folder: Path, shape: tuple[int, int], frame_rate_hz: float, entries: Sequence[Mapping[str, Any]]
 ) -> Campaign:
-    """Write `campaign.json` and read the campaign back.  entries: of `recordings`; those that are None are left out."""
+    """Write `campaign.json` and read the campaign back; entries that are None are left out."""
     data = {
         "format": FORMAT,
         "camera": {"height": shape[0], "width": shape[1], "frame_rate_hz": frame_rate_hz},

@@ -1,4 +1,4 @@
-"""Many cameras stepped at once, on a GPU: for training agents and for seas of simulated data."""
+"""Many cameras stepped at once, on a GPU: for training agents and for large sets of simulated data."""
 
 from __future__ import annotations
 
@@ -23,43 +23,53 @@ from spikecam_env.sensor.light import (
     check_radiance,
     light_values,
     segments,
-    warn_beside,
+    warn_outside,
 )
 from spikecam_env.sensor.model import SensorModel, generator
+from spikecam_env.types import Floats, Masks, Pictures
 
 
 @dataclass(frozen=True)
 class SensorBatchState:
-    """A batch mid-stream: what its cameras are, each one's next frame (B,), phase (B, H, W), pixels.  Picklable.
+    """A batch mid-stream: its cameras and their pixels.  Picklable.
 
-    >>> cameras, light = SpikeSensorBatch("scsim", shape=(4, 4), seeds=[0, 1], device="cpu"), np.full((4, 4), 0.3)
-    >>> state = cameras.state()
-    >>> spikes = cameras.step(light, frames=16)
-    >>> cameras.restore(state)
-    >>> bool((cameras.step(light, frames=16) == spikes).all())
-    True
+    Example:
+        >>> cameras, light = SpikeSensorBatch("scsim", shape=(4, 4), seeds=[0, 1], device="cpu"), np.full((4, 4), 0.3)
+        >>> state = cameras.state()
+        >>> spikes = cameras.step(light, frames=16)
+        >>> cameras.restore(state)
+        >>> bool((cameras.step(light, frames=16) == spikes).all())
+        True
     """
 
     models: tuple[SensorModel, ...]
     seeds: tuple[int, ...]
     frame: NDArray[np.int64]
-    phase: NDArray[np.float64]
+    """Each camera's next (B,)."""
+    phase: Floats
+    """(B, H, W)."""
     pixels: cuda.BatchState
 
 
 class SpikeSensorBatch:
-    """B spike cameras of `shape` (rows, columns) pixels.  Each gives the bits of SpikeSensor(engine="fast").
+    """B spike cameras, each of which gives the bits of SpikeSensor(engine="fast").
 
-    models: one model for all (SensorModel, preset's name or TOML path), or B of them.
-    seeds: B whole numbers, one a camera; see SpikeSensor.
-    device: "cuda", "cuda:1" or "cpu".  On CUDA the Triton kernel runs where Triton is installed, else plain torch;
-        `kernel` says which.  The processor runs plain torch: made for tests, many times slower than the fast engine.
-    frame: (B,) int64, absolute index of each camera's next frame.
-    Raises InputError for a device that is not there, an effect that the engine does not carry, and bad arguments.
+    Attribute `frame` (B,) int64 is the absolute index of each camera's next frame.
 
-    >>> cameras = SpikeSensorBatch("ideal", shape=(2, 2), seeds=[0, 1], device="cpu")
-    >>> cameras.step(np.full((2, 2), 0.25, np.float32), frames=8).sum(dim=1).tolist()
-    [[[2, 2], [2, 2]], [[2, 2], [2, 2]]]
+    Args:
+        models: one model for all (SensorModel, preset's name or TOML path), or B of them.
+        shape: (rows, columns) of pixels.
+        seeds: B whole numbers, one a camera; see SpikeSensor.
+        device: "cuda", "cuda:1" or "cpu".  On CUDA the Triton kernel runs where Triton is installed, else plain torch;
+            attribute `kernel` names it.  The processor runs plain torch: made for tests, many times slower than "fast".
+
+    Raises:
+        InputError: for a missing device, an effect that the engine does not carry, and bad arguments.
+
+    Example:
+        >>> cameras = SpikeSensorBatch("ideal", shape=(2, 2), seeds=[0, 1], device="cpu")
+        >>> cameras.step(np.full((2, 2), 0.25, np.float32), frames=8).sum(dim=1).tolist()
+        [[[2, 2], [2, 2]], [[2, 2], [2, 2]]]
     """
 
     def __init__(
@@ -80,7 +90,7 @@ class SpikeSensorBatch:
         self.phase = np.stack([generator(seed, "phase").random(self.shape) for seed in self.seeds])
         self._pixels = self._started(range(len(self.seeds)))
 
-    _films: Sequence[Keyframes | NDArray[np.float32]] = ()
+    _films: Sequence[Keyframes | Pictures] = ()
     """Those of the last step: see `SpikeSensor`."""
 
     def __len__(self) -> int:
@@ -89,12 +99,21 @@ class SpikeSensorBatch:
     def step(
         self, radiance: Keyframes | Sequence[Keyframes] | torch.Tensor | ArrayLike, frames: int = 1
     ) -> torch.Tensor:
-        """Expose the next frames of every camera; returns spikes (B, frames, H, W) uint8, 0 or 1, on the device.
+        """Expose the next frames of every camera.
 
-        radiance: (H, W) or (B, H, W) held throughout, as an array or a tensor; Keyframes for all cameras, or a list of
-        B, on each camera's own absolute frame numbers, whose light may lie on the device (`PlanarScene.radiance`).
         Optics (blur, vignetting) act on the host: a tensor on the GPU is copied there and back.
-        Raises InputError as SpikeSensor.step does.
+
+        Args:
+            radiance: (H, W) or (B, H, W) held throughout, as an array or a tensor; Keyframes for all cameras, or a list
+                of B, on each camera's own absolute frame numbers; their light may lie on the device
+                (`PlanarScene.radiance`).
+            frames: how many.
+
+        Returns:
+            Spikes (B, frames, H, W) uint8, 0 or 1, on the device.
+
+        Raises:
+            InputError: as SpikeSensor.step does.
         """
         frames = checked_count(frames)
         pieces = self._pieces(radiance, frames)
@@ -159,9 +178,9 @@ class SpikeSensorBatch:
         )
 
     def restore(self, state: SensorBatchState) -> None:
-        """Go on from a saved state, of any device; raises InputError for other models, another number or shape."""
+        """Go on from a saved state, of any device; InputError for other models, another number or shape."""
         if not isinstance(state, SensorBatchState):
-            raise InputError(f"state is a {type(state).__name__}; it must be what SpikeSensorBatch.state() returns")
+            raise InputError(f"state is a {type(state).__name__}; give one of SpikeSensorBatch.state()")
         if state.phase.shape != (len(self), *self.shape):
             raise InputError(
                 f"this state is of (cameras, rows, columns) = {state.phase.shape}; this batch is "
@@ -186,7 +205,7 @@ class SpikeSensorBatch:
         return cuda.start(units, phases, [self.seeds[b] for b in cameras], self.device)
 
     def _pieces(self, radiance: Any, frames: int) -> Iterator[cuda.BatchSegment]:
-        """The light of the next frames, checked before any is exposed, cut to what a kernel takes in one go."""
+        """The light of the next frames, checked before any is exposed, cut into segments of one kernel call."""
         if isinstance(radiance, Keyframes) and self._alike and np.all(self.frame == self.frame[0]):
             return self._moving([as_light(radiance, self.shape)], frames)
         if isinstance(radiance, Keyframes):
@@ -197,26 +216,29 @@ class SpikeSensorBatch:
             return self._moving([as_light(light, self.shape) for light in radiance], frames)
         return self._still(self._checked_pictures(radiance), frames)
 
-    def _moving(self, lights: Sequence[Keyframes | NDArray[np.float32]], frames: int) -> Iterator[cuda.BatchSegment]:
+    def _moving(self, lights: Sequence[Keyframes | Pictures], frames: int) -> Iterator[cuda.BatchSegment]:
         for light, at in zip(lights, self.frame, strict=False):
             if not any(light is film for film in self._films):
-                warn_beside(light, int(at), frames)
+                warn_outside(light, int(at), frames)
         self._films = lights
         films = [segments(light, int(self.frame[b]), frames) for b, light in enumerate(lights)]
         for cut in cut_alike(films):
-            seen = [imaging.seen(_on_host(s)) if imaging else s for imaging, s in zip(self._imaging, cut, strict=False)]
-            yield cuda.BatchSegment.of(seen, self.device)
+            images = [
+                imaging.segment_image(_on_host(s)) if imaging else s
+                for imaging, s in zip(self._imaging, cut, strict=False)
+            ]
+            yield cuda.BatchSegment.of(images, self.device)
 
     def _still(self, pictures: torch.Tensor, frames: int) -> Iterator[cuda.BatchSegment]:
-        """pictures: (B, H, W) or (1, H, W) float32."""
+        """Segments of held light (B, H, W) or (1, H, W)."""
         light = pictures.reshape(len(pictures), -1)
         if any(self._imaging):
-            light = torch.from_numpy(self._seen(light.cpu().numpy()))
+            light = torch.from_numpy(self._images(light.cpu().numpy()))
         light = light.to(self.device)
         for done in range(0, frames, MAX_SEGMENT):
             yield cuda.BatchSegment.held(light, min(MAX_SEGMENT, frames - done))
 
-    def _seen(self, light: NDArray[np.float32]) -> NDArray[np.float32]:
+    def _images(self, light: Pictures) -> Pictures:
         """Held light (B, P) or (1, P) through each camera's optics."""
         if not self._alike:
             light = np.broadcast_to(light, (len(self), light.shape[1]))
@@ -241,10 +263,7 @@ class SpikeSensorBatch:
 
 
 def cut_alike(films: Sequence[Iterator[Segment]]) -> Iterator[list[Segment]]:
-    """Segments of several cameras, cut so that each step has one count for all; no cut changes a bit.
-
-    films: each of the same number of frames.
-    """
+    """Segments of several films of as many frames, cut so that each step has one count for all: no bit changes."""
     rest: list[Segment | None] = [next(film, None) for film in films]
     while all(rest):
         now = [segment for segment in rest if segment is not None]
@@ -259,7 +278,7 @@ def cut_alike(films: Sequence[Iterator[Segment]]) -> Iterator[list[Segment]]:
 
 
 def _on_host(segment: Segment) -> Segment:
-    """With its light in arrays."""
+    """The segment with its light in arrays."""
     if not isinstance(segment.radiance0, torch.Tensor):
         return segment
     start = segment.radiance0.cpu().numpy()
@@ -289,7 +308,7 @@ def _checked_models(models: Any, cameras: int) -> tuple[SensorModel, ...]:
     return loaded
 
 
-def _checked_mask(mask: ArrayLike, cameras: int) -> NDArray[np.bool_]:
+def _checked_mask(mask: ArrayLike, cameras: int) -> Masks:
     checked = np.asarray(mask)
     if checked.shape != (cameras,) or checked.dtype != bool:
         raise InputError(f"mask is {checked.dtype} {checked.shape}; it must be bool, one a camera: ({cameras},)")

@@ -1,17 +1,16 @@
-"""Light that bends within a frame: how far it is from what effects take it for, and a refusal where that matters.
+"""Light that bends within a frame: the errors of effects in it, and a refusal where they are large.
 
-A frame with keys inside it gets its light L(t) exactly, but charge comes evenly over it as far as crossings are timed,
-and effects that need more than the mean know the straight line with L's first moment besides.  Of a frame's charge x
-these are off by at most
+A frame with keys inside it gets its light L(t) exactly.  Crossings, however, are timed as if charge came evenly, and
+effects know the mean of L and the straight line with its first moment.  Of a frame's charge x they are off by at most
 
     x TV min(moved / x, 1), x range at most      a reference that moves by `sway`: its variation and range in the frame
     tau x uneven + c sqrt(x) uneven              light that is lost while a node is held (`Feedback`)
     f x min(2 moved / (x tau), 1)                charge that a reset leaves, by the interval that has ended
     4 k moved                                    kicks that come at another time, in another order
-    `Effect.off_the_line`                        what an effect says of itself
+    `Effect.off_the_line`                        error of `collect`, declared by the effect
 
 in thresholds; moved: charge that comes at another time than if evenly; uneven: the largest |L - x|.  More than ALLOWED
-of the frame's charge is refused.  Films with keys at whole frames are never looked at.
+of the frame's charge is refused.  Films with keys at whole frames are never checked.
 """
 
 from __future__ import annotations
@@ -31,8 +30,8 @@ ALLOWED = 0.01
 """Share of a frame's charge by which an effect may be off: a rate is off by no more."""
 
 FAINT = 0.01
-"""Charge [thresholds]: of a frame that has less, so much is the whole.  What is off is then a ten-thousandth of a
-threshold a frame at most, less than an electron."""
+"""Charge [thresholds] that counts as the whole of a fainter frame: its error is then a ten-thousandth of a threshold
+at most, less than an electron."""
 
 
 def concerned(effects: Sequence[Effect], first: ExposureBlock) -> bool:
@@ -48,9 +47,14 @@ def check_bent(
     effects: Sequence[Effect],
     image: Callable[..., Pictures],
 ) -> None:
-    """Raise InputError for the first frame of start .. start + frames whose light takes an effect off by too much.
+    """Refuse light in which an effect is off by too much.
 
-    first: as given to an engine's `start`.  image: what optics make of a picture (H*W,).
+    Args:
+        first: as given to an engine's `start`.
+        image: the optics, a function of a picture (H*W,).
+
+    Raises:
+        InputError: for the first such frame; it names effect, pixel and error.
     """
     for frame in frames_with_keys(light, start, start + frames):
         now = replace(first, number=frame)
@@ -76,7 +80,7 @@ def frames_with_keys(light: Keyframes, start: int, stop: int) -> Iterator[int]:
 
 
 def bend_of(light: Keyframes, frame: int, now: ExposureBlock, image: Callable[..., Pictures]) -> Bend:
-    """How the charge of every pixel comes in that frame."""
+    """How unevenly the charge of every pixel comes in that frame."""
     times, pictures = course(light, frame)
     gain, dark = (a.astype(np.float64) / GRAINS for a in now.unit.grains_per_frame)
     levels = np.stack([image(p) * gain + dark for p in pictures])

@@ -3,8 +3,8 @@ alone.
 
     mean of [a, b] = sum_k m_k L_k          rise = sum_k r_k L_k = 12 / (b - a)^2 integral of (t - (a + b)/2) L(t) dt
 
-The rise is that of the straight line with the mean and the first moment of the light: what one who integrates over
-part of a frame needs of it besides.  All of it is float64.
+The rise is that of the straight line with the mean and the first moment of the light: integrals over part of a frame
+need it besides the mean.  All is float64.
 """
 
 from __future__ import annotations
@@ -17,11 +17,13 @@ from spikecam_env.types import Floats
 
 
 class KeyWeights(NamedTuple):
-    """mean, rise: (n,) weights of the keys first .. first + n."""
+    """Weights of the keys first .. first + n."""
 
     first: int
     mean: Floats
+    """(n,)."""
     rise: Floats
+    """(n,)."""
 
 
 def key_weights(times: Floats, start: float, stop: float) -> KeyWeights:

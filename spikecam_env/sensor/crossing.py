@@ -3,36 +3,41 @@
     q(u) = begin + gained u,  u: 0 .. 1 of the frame;   fires at the first u at which q(u) >= limit(u)
 
 The limit is linear between nodes; where it jumps there are two nodes at the same moment.  A reset clears the pixel: it
-takes q(u), with what a jump of the limit or a neighbour's kick left above it, and what comes afterwards is kept.  At a
-frame's start it takes the limit: what holds for a frame, and may be another in the next, is a course sampled once a
-frame.
+takes q(u), with the charge that a jump of the limit or a neighbour's kick left above it.  Charge that comes afterwards
+is kept.  At a frame's start the reset takes the limit: a reference that holds for a frame is sampled once a frame.
 
-In numbers alone, so that numpy's world and a compiled loop give the same bits.
+Plain arithmetic, so that numpy and a compiled loop give the same bits.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 
-import numpy as np
-from numpy.typing import NDArray
+from spikecam_env.types import Floats
 
-Numbers = Sequence[float] | NDArray[np.float64]
+Numbers = Sequence[float] | Floats
 
 NEVER = 2.0
 """The moment of a crossing that is not in the frame."""
 
 MOST_AGAIN = 8
-"""Times at most that what a reset left takes a pixel to its threshold once more in a frame.  A reset leaves half a
-threshold at most, so that six use up the three thresholds a frame can hold; a reference far below the nominal would go
-on for ever, and what is above it is there in the next frame."""
+"""Times at most that charge left by a reset takes a pixel to its threshold once more in a frame.  A reset leaves half a
+threshold at most, so that six use up the three thresholds a frame can hold.  A reference far below the nominal would go
+on for ever; charge above it is kept for the next frame."""
 
 
 def first_crossing(begin: float, gained: float, since: float, at: Numbers, limits: Numbers) -> tuple[float, float]:
-    """When a pixel is first at its limit from `since` on, NEVER if not, and the charge that the reset takes [grains].
+    """When a pixel is first at its limit.
 
-    begin: charge at the frame's start, if it came as now since then; gained: charge of the frame [grains].
-    at: moments of the nodes, 0 .. 1, ascending; limits: at each [grains].
+    Args:
+        begin: charge at the frame's start, if it came as now since then [grains].
+        gained: charge of the frame [grains].
+        since: earliest moment.
+        at: moments of the nodes, 0 .. 1, ascending.
+        limits: at each node [grains].
+
+    Returns:
+        The moment, NEVER if there is none, and the charge that the reset takes [grains].
     """
     least = min(limits)
     for k in range(1, len(at)):

@@ -1,17 +1,18 @@
-"""The exponential of a decay in multiplications alone, so that numpy and a compiled loop give the same bits, and the
-loop takes many pixels at once: no two libraries' exp agree in the last bit, and one call a spike costs more than it."""
+"""The exponential of a decay in multiplications alone: numpy and a compiled loop then give the same bits.
+
+No two libraries' exp agree in the last bit, and a call a spike costs more than many pixels at once by arithmetic.
+"""
 
 from __future__ import annotations
 
 from typing import TypeVar
 
-import numpy as np
-from numpy.typing import NDArray
+from spikecam_env.types import Floats
 
 LONG = 40.0
-"""Time constants after which nothing is left, in double precision beside 1."""
+"""Time constants after which nothing is left beside 1 in double precision."""
 
-Number = TypeVar("Number", float, NDArray[np.float64])
+Number = TypeVar("Number", float, Floats)
 
 _HALVINGS = 8
 _TERMS = tuple(1.0 / n for n in range(11, 0, -1))

@@ -1,4 +1,4 @@
-"""Whether an effect's class declares what every effect must: asked of a user's own before it joins the catalogue."""
+"""Checks of an effect's class: is all declared?  A user's own passes them before it joins the catalogue."""
 
 from __future__ import annotations
 
@@ -16,8 +16,7 @@ from spikecam_env.sensor.own_hooks import CHECKS
 
 NAME = re.compile(r"[a-z][a-z0-9]*(_[a-z0-9]+)*")
 COUNTED = ("pixels", "spikes", "frames")
-"""What a `share` can be a share of."""
-
+"""Countable things of which a parameter can be a share."""
 
 PARTNERS = {"sway": "parts", "parts": "sway", "kinks": "sway"}
 """Hook -> the hook without which it is never called, or changes nothing."""
@@ -26,7 +25,7 @@ IDLE = ("begin", "parts", "kinks", "off_the_line", "feedback")
 
 
 def check_declaration(effect: type[Effect]) -> None:
-    """Raises InputError for the first thing that is missing or wrong in an effect's class, and says how to mend it."""
+    """Raise InputError for the first fault of an effect's class, with its remedy."""
     _check_class(effect)
     known = {f.name: f for f in fields(effect)}
     for field in known.values():

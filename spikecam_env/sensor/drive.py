@@ -1,6 +1,6 @@
-"""What a block of frames does to the pixels, whatever fires: charge that arrives and references that move.
+"""Charge that arrives and references that move in a block of frames, whatever fires.
 
-Worked out here from the effects' hooks, once for all engines.
+Computed here from the effects' hooks, once for all engines.
 """
 
 from __future__ import annotations
@@ -18,46 +18,42 @@ from spikecam_env.sensor.model import generator
 from spikecam_env.types import Floats, Masks, Pictures
 
 Memory = dict[str, Any]
-"""What each effect remembers, by its name."""
-
+"""State of each effect, by its name."""
 
 _TOUCHES = 1e-9
-"""A kink that near to the end of a part [frames] is there: rounding would leave it on either side."""
+"""A kink so near to the end of a part [frames] counts as at it: rounding would leave it on either side."""
 
 
 @dataclass(frozen=True)
 class Sway:
-    """How the references move within F frames of H rows: linear between n nodes.
-
-    at: (H or 1, n) moments of the row's own frame, 0 .. 1, ascending; where a reference jumps, twice the same.
-    factor, common [mV]: (F or 1, H or 1, n), with what holds for the frame.
-    """
+    """How the references move within F frames of H rows: linear between n nodes."""
 
     at: Floats
+    """(H or 1, n) moments of the row's own frame, 0 .. 1, ascending; where a reference jumps, twice the same."""
     factor: Floats
+    """(F or 1, H or 1, n), the frame's own factor included."""
     common: Floats
+    """As factor [mV]."""
 
 
 @dataclass(frozen=True)
 class Comparators:
-    """A pixel fires at threshold * factor + grains_per_mV * (common + field), in F frames of H rows and P pixels.
-
-    factor: (F, H).  common: (F, H) [mV].  field: (F, P), or (1, P) where all frames are alike, float32 [mV].
-    grains_per_mV: (P,).  sway: where factor and common move within the frames; these are then the least of each frame.
-    """
+    """A pixel fires at threshold * factor + grains_per_mV * (common + field), in F frames of H rows and P pixels."""
 
     factor: Floats
+    """(F, H), the least of each frame."""
     common: Floats
+    """(F, H) [mV], the least of each frame."""
     field: Pictures
+    """(F, P), or (1, P) where all frames are alike [mV]."""
     grains_per_mV: Floats
+    """(P,)."""
     sway: Sway | None
+    """How factor and common move within the frames; None where they do not."""
 
 
 def begin(first: ExposureBlock, effects: Sequence[Effect], seed: int, unit_seed: int | None = None) -> Memory:
-    """What each effect remembers at the first frame.
-
-    Each has generators of its own: adding or removing one leaves the draws of the others as they were.
-    """
+    """State of each effect at the first frame, each with generators of its own: no other effect changes its draws."""
     of_unit = seed if unit_seed is None else unit_seed
     return {
         e.name: e.begin(first, generator(of_unit, f"{e.name}: unit"), generator(seed, f"{e.name}: temporal"))
@@ -73,12 +69,17 @@ def expected_charge(
     rise: Floats | float = 0.0,
     pieces: Sequence[Piece] = (),
 ) -> tuple[Charge, Charge]:
-    """Charge of the frames from light and in the dark, given that of the light law, mean (F or 1, P) [thresholds].
+    """Charge of the frames from light and in the dark.
 
-    rise: of that law within each frame, as mean, where `wants_rise`.  pieces: of the light of one frame that bends
-    within it, where `wants_pieces`.
-    The dark part matters, and is worked out, where an effect wants it or where dark charge is free of noise.
-    Updates `memory`.
+    The dark part is computed where an effect changes charge or where dark charge is free of noise.
+
+    Args:
+        mean: charge by the light law (F or 1, P) [thresholds].
+        rise: of that law within each frame, as mean, where `wants_rise`.
+        pieces: of the light of one frame that bends within it, where `wants_pieces`.
+
+    Returns:
+        Charge from light, and in the dark.
     """
     acting = having("collect", effects)
     whole = mean.reshape(-1, *now.shape)
@@ -89,7 +90,7 @@ def expected_charge(
     light = Charge(whole - below, rise=rise if isinstance(rise, float) else rise.reshape(-1, *now.shape))
     dark = Charge(below)
     for effect in acting:
-        if pieces and asks_for_pieces(effect):
+        if pieces and acts_on_pieces(effect):
             light, memory[effect.name], pieces = _collect_by_pieces(
                 effect, light, dark, now, memory[effect.name], pieces
             )
@@ -106,8 +107,10 @@ def expected_charge(
 def _collect_by_pieces(
     effect: Effect, light: Charge, dark: Charge, now: ExposureBlock, memory: Any, pieces: Sequence[Piece]
 ) -> tuple[Charge, Any, list[Piece]]:
-    """What an effect makes of the light of one frame, a piece after another: to its mean and to its rise comes what the
-    effect changes, so that what it leaves alone keeps its bits."""
+    """The light of one frame after an effect that acts on its pieces, one after another.
+
+    Changes are added to mean and rise of the frame, so that unchanged light keeps its bits.
+    """
     mean, rise, after = light.values, np.broadcast_to(light.rises, light.values.shape), []
     for start, length, x, d in pieces:
         given = Charge(x.reshape(1, *now.shape), 1.0, d.reshape(1, *now.shape))
@@ -127,15 +130,17 @@ def _in_proportion(pieces: Sequence[Piece], before: Floats, after: Floats) -> li
 
 
 def _as_read(light: Charge, lead: Floats | float, pieces: Sequence[Piece]) -> Charge:
-    """Light of one frame, rows of which are read `lead` (H, 1) before its end, or a frame and so much less: its rise is
-    that of the line of which as much comes after that moment."""
+    """Light of one frame whose rows are read `lead` (H, 1) before its end, or a frame and so much less.
+
+    Its rise is that of the straight line of which as much comes after the read-out.
+    """
     values = light.values
     early = lead - (np.asarray(lead) > 1.0)
     late = np.zeros_like(values)
     for start, length, x, d in pieces:
         begin = np.clip(1.0 - early, start, start + length)
         inside = start + length - begin
-        arm = 0.5 * (begin - start)  # of the middle of what comes after from that of the piece
+        arm = 0.5 * (begin - start)  # from the middle of the piece to the middle of its later part
         late += inside * (x.reshape(values.shape) + d.reshape(values.shape) * (arm / length))
     flat = early * (1.0 - early)
     rise = np.divide(2.0 * (late - early * values), flat, out=np.zeros_like(values), where=flat + 0.0 * values > 0.0)
@@ -149,11 +154,11 @@ def wants_rise(effects: Sequence[Effect]) -> bool:
 
 def wants_pieces(effects: Sequence[Effect]) -> bool:
     """Whether an effect asks for the pieces of a frame whose light bends."""
-    return any(asks_for_pieces(effect) or effect.overrides("lead") for effect in effects)
+    return any(acts_on_pieces(effect) or effect.overrides("lead") for effect in effects)
 
 
-def asks_for_pieces(effect: Effect) -> bool:
-    """Whether an effect acts on light piece by piece; one of the read-out, which says where frames end, does not."""
+def acts_on_pieces(effect: Effect) -> bool:
+    """Whether an effect acts on light piece by piece; one of the read-out, which sets where frames end, does not."""
     return effect.wants_rise and effect.stage < Stage.READOUT
 
 
@@ -164,10 +169,7 @@ def parts(first: ExposureBlock, effects: Sequence[Effect]) -> int:
 
 
 def lead(first: ExposureBlock, effects: Sequence[Effect]) -> Floats:
-    """How long before the end of the array's frame each row is read (H, 1) [frames].
-
-    At u of its own frame, 0 .. 1, the array's clock stands at u - lead.
-    """
+    """Time from each row's read-out to the end of the array's frame (H, 1) [frames]: at u its clock is at u - lead."""
     return np.zeros((first.shape[0], 1)) + sum(effect.lead(first) for effect in effects)
 
 

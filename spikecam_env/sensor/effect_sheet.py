@@ -1,4 +1,4 @@
-"""What an effect's own module says of it, in parts: for the command, for reports, and for docs/effects.md."""
+"""The docstring of an effect's module in parts: for the command, for reports, and for docs/effects.md."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ SECTIONS = ("Stage", "Seen in", "Twins", "Within a frame", "Source")
 
 @dataclass(frozen=True)
 class Sheet:
-    """What an effect's module says of it: its first line, the law (indented as it stands), and the named sections."""
+    """First line of an effect's module, the law (indented as it stands), and the named sections."""
 
     summary: str
     law: str
@@ -23,7 +23,7 @@ class Sheet:
 
     @classmethod
     def of(cls, effect: type[Effect]) -> Sheet:
-        """Read a module's docstring; raises InputError where it has no law."""
+        """Read a module's docstring; InputError where it has no law."""
         text = inspect.getdoc(sys.modules[effect.__module__]) or ""
         head, *rest = re.split(rf"\b({'|'.join(SECTIONS)}):\s", text)
         summary, _, law = head.partition("\n")

@@ -1,4 +1,4 @@
-"""Closed forms of what changes within a frame: means over it, and moments about its middle.
+"""Closed forms of factors that change within a frame: means over it, and moments about its middle.
 
 An effect that multiplies charge by w(t) needs, of t in frames from the middle of the frame,
 
@@ -21,7 +21,7 @@ _SMALL = 0.01
 
 
 class Moments(NamedTuple):
-    """(F, 1, 1) each: of what light is multiplied by, in every frame of a block; see the module's equation."""
+    """Moments of a factor of light in every frame of a block, (F, 1, 1) each; see the module's equation."""
 
     mean: Floats
     tilt: Floats

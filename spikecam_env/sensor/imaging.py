@@ -1,4 +1,4 @@
-"""Static optics: what the lens makes of the light that a scene gives."""
+"""Static optics: the image that the lens gives of a scene."""
 
 from __future__ import annotations
 
@@ -6,8 +6,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from spikecam_env.sensor.effects.base import Effect
-from spikecam_env.sensor.kernels.ahead import same_light
-from spikecam_env.sensor.light import Segment
+from spikecam_env.sensor.light import Segment, same_light
 from spikecam_env.types import Pictures
 
 
@@ -15,8 +14,8 @@ class Imaging:
     """The optics among a model's effects, for pictures of `shape`.
 
     They are linear, so they act on the two ends of a ramp.  The images of the last two pictures are kept, since a key
-    interval begins where the one before it ended.  A picture is known again by its values: whoever changes an array in
-    place gets another image.
+    interval begins where the one before it ended.  Pictures are compared by value: an array
+    that was changed in place gets another image.
     """
 
     def __init__(self, effects: Sequence[Effect], shape: tuple[int, int]) -> None:
@@ -27,7 +26,7 @@ class Imaging:
     def __bool__(self) -> bool:
         return bool(self._optics)
 
-    def seen(self, segment: Segment) -> Segment:
+    def segment_image(self, segment: Segment) -> Segment:
         """Light as it reaches the pixels."""
         if not self._optics:
             return segment

@@ -8,7 +8,7 @@ Collected light is counted in *grains*, GRAINS = 2^23 to a pixel's own threshold
 anything physical), in whole numbers.  Within a key interval of n frames whose light goes from i0 to i1 grains
 a frame, the grains collected before frame k are
 
-    F(k) = i0 k + (i1 - i0) k^2 / 2n = i0 k + B k^2 + r k^2 / 2n        i1 - i0 = 2 n B + r
+    F(k) = i0 k + (i1 - i0) k^2 / 2n = i0 k + B k^2 + r k^2 / 2n;        i1 - i0 = 2 n B + r
 
 in 32-bit integer arithmetic, rounded down, so engines that compute it in closed form or frame by frame give the same
 bits.  F never falls, down to single grains: 1/2n is taken in 2^-18, rounded up.
@@ -32,6 +32,8 @@ from numpy.typing import ArrayLike, NDArray
 from spikecam_env.compiled import njit
 from spikecam_env.errors import InputError
 from spikecam_env.sensor.between_keys import key_weights
+from spikecam_env.sensor.compiled_tools.intrinsics import use_widest_vectors
+from spikecam_env.types import Floats, Pictures
 
 GRAINS = 1 << 23
 """Grains of charge to one threshold."""
@@ -66,17 +68,19 @@ MAX_SEGMENT = 64
 class Keyframes:
     """Radiance at key frames, linear between them, constant outside.
 
-    frame: (K,) float64, strictly increasing [frames].  radiance: (K, H, W) float32, >= 0.
     Light is integrated over each frame exactly, whatever the times of its keys.  Frames between two keys are
     integrated in one go, up to 64 of them; a frame with keys inside it takes a pass of its own.  For light that jumps
     see `steps`.
-    An array that is float32 and C-contiguous already is kept, not copied: what is written to it later is what later
-    steps see.  Raises InputError for other shapes, unordered frames, numbers that are no light (see `light_values`),
-    and radiance that is negative or not finite.
+
+    Raises:
+        InputError: for other shapes, unordered frames, values that are no light (see `light_values`), and radiance
+            that is negative or not finite.
     """
 
-    frame: NDArray[np.float64]
-    radiance: NDArray[np.float32]
+    frame: Floats
+    """(K,) float64, strictly increasing [frames]."""
+    radiance: Pictures
+    """(K, H, W) float32, >= 0.  A C-contiguous float32 array is kept, not copied: later changes of it act."""
 
     def __post_init__(self) -> None:
         frame = real_numbers(self.frame, "Keyframes.frame", "iuf").astype(np.float64)
@@ -94,9 +98,8 @@ class Keyframes:
         object.__setattr__(self, "radiance", radiance)
 
     @classmethod
-    def known(cls, frame: NDArray[np.float64], radiance: NDArray[np.float32]) -> Keyframes:
-        """Of light that is known to be right, as a scene's own is: its values are not looked at, which would take a
-        sixth of the time that it takes to paint them."""
+    def known(cls, frame: Floats, radiance: Pictures) -> Keyframes:
+        """Keyframes without checks, for a scene's own light: checks take a sixth of the time of painting."""
         keys = object.__new__(cls)
         object.__setattr__(keys, "frame", frame)
         object.__setattr__(keys, "radiance", radiance)
@@ -111,12 +114,14 @@ class Keyframes:
     def steps(cls, frame: ArrayLike, radiance: ArrayLike) -> Keyframes:
         """Light that jumps: radiance[i] (H, W) from frame[i] until frame[i + 1], the first one also before.
 
-        Each jump is two keys, at its time and at the number just below.  frame (K,), radiance (K, H, W) and errors as
-        of Keyframes.
+        Args:
+            frame: (K,) as of Keyframes; each jump becomes two keys, at its time and at the number just below.
+            radiance: (K, H, W) as of Keyframes.
 
-        >>> light = Keyframes.steps([0.0, 100.75], [[[0.0]], [[1.0]]])
-        >>> float(light.at(100.7)[0, 0]), float(light.at(100.75)[0, 0])
-        (0.0, 1.0)
+        Example:
+            >>> light = Keyframes.steps([0.0, 100.75], [[[0.0]], [[1.0]]])
+            >>> float(light.at(100.7)[0, 0]), float(light.at(100.75)[0, 0])
+            (0.0, 1.0)
         """
         given = cls(frame, light_values(radiance))  # type: ignore[arg-type]
         jumps = given.frame[1:]
@@ -124,8 +129,8 @@ class Keyframes:
         keys = np.repeat(np.arange(given.frame.size), 2)[:-1]
         return cls(np.concatenate([given.frame[:1], times]), given.radiance[keys])
 
-    def at(self, frame: float) -> NDArray[np.float32]:
-        """Radiance (H, W) at an instant [frames]; what a frame collects is the mean over it."""
+    def at(self, frame: float) -> Pictures:
+        """Radiance (H, W) at an instant [frames]; a frame collects the mean over it."""
         if frame <= self.frame[0]:
             return self._picture(0)
         if frame >= self.frame[-1]:
@@ -134,28 +139,29 @@ class Keyframes:
         w = np.float32((frame - self.frame[i]) / (self.frame[i + 1] - self.frame[i]))
         if w == 0.0:
             return self._picture(i)
-        between: NDArray[np.float32] = self.radiance[i] * (np.float32(1.0) - w) + self.radiance[i + 1] * w
+        between: Pictures = self.radiance[i] * (np.float32(1.0) - w) + self.radiance[i + 1] * w
         return between
 
-    def _picture(self, key: int) -> NDArray[np.float32]:
-        picture: NDArray[np.float32] = self.radiance[key]
+    def _picture(self, key: int) -> Pictures:
+        picture: Pictures = self.radiance[key]
         return picture
 
 
-def light_values(values: ArrayLike) -> NDArray[np.float32]:
-    """Light as C-contiguous float32.
-
-    Raises InputError for whole numbers, which are pictures and no light, and as `real_numbers` does.
-    """
+def light_values(values: ArrayLike) -> Pictures:
+    """Light as C-contiguous float32; InputError for whole numbers (pictures, no light) and as `real_numbers`."""
     array = real_numbers(values, "radiance", "f")
     with np.errstate(over="ignore"):  # beyond float32 is infinity, which is refused as such
         return np.ascontiguousarray(array, dtype=np.float32)
 
 
 def real_numbers(values: ArrayLike, name: str, kinds: str) -> NDArray[Any]:
-    """An array of real numbers of these kinds (numpy's letters).
+    """An array of real numbers.
 
-    Raises InputError for others, such as True, text, objects, complex or ragged ones, and where some are masked.
+    Args:
+        kinds: numpy's letters of allowed types.
+
+    Raises:
+        InputError: for others, such as True, text, objects, complex or ragged ones, and where some are masked.
     """
     if _masks_some(values):
         raise InputError(f"{name} is masked in part; fill it first, e.g. with .filled(0.0)")
@@ -180,11 +186,8 @@ def _masks_some(values: Any) -> bool:
     return isinstance(values, np.ma.MaskedArray) and bool(np.ma.is_masked(values))
 
 
-def warn_beside(light: Keyframes | NDArray[np.float32], start: int, frames: int) -> None:
-    """Warn of a film new to the stream whose keys all lie before or after frames start .. start + frames.
-
-    Keys are on absolute frames: to give every call keys that begin at 0 is a likely mistake.
-    """
+def warn_outside(light: Keyframes | Pictures, start: int, frames: int) -> None:
+    """Warn of a film new to the stream whose keys all lie before or after frames start .. start + frames."""
     if not isinstance(light, Keyframes) or light.frame.size < 2 or start == 0:
         return
     first, last = float(light.frame[0]), float(light.frame[-1])
@@ -196,7 +199,7 @@ def warn_beside(light: Keyframes | NDArray[np.float32], start: int, frames: int)
         )
 
 
-def check_radiance(radiance: NDArray[np.float32]) -> None:
+def check_radiance(radiance: Pictures) -> None:
     """Raise InputError unless every value is finite and not negative."""
     low, high = radiance.min(), radiance.max()
     if not (low >= 0.0 and high < np.inf):
@@ -205,21 +208,25 @@ def check_radiance(radiance: NDArray[np.float32]) -> None:
 
 
 class LightWithinFrame(NamedTuple):
-    """Light within a frame that holds keys: times (n,) in it, 0 .. 1, and the picture (H*W,) at each; linear
-    between."""
+    """Light within a frame that holds keys, linear between its times."""
 
-    times: NDArray[np.float64]
-    pictures: tuple[NDArray[np.float32], ...]
+    times: Floats
+    """(n,) in the frame, 0 .. 1."""
+    pictures: tuple[Pictures, ...]
+    """(H*W,) at each time."""
 
 
 class Piece(NamedTuple):
-    """A stretch of a frame in which light is linear: from when and for how long [frames], mean and rise of the light in
-    it (P,), as much a frame."""
+    """A stretch of a frame in which light is linear."""
 
     start: float
+    """[frames]."""
     length: float
-    mean: NDArray[np.float64]
-    rise: NDArray[np.float64]
+    """[frames]."""
+    mean: Floats
+    """Of the light in it (P,) [per frame]."""
+    rise: Floats
+    """From its start to its end (P,) [per frame]."""
 
 
 INSTANT = 1e-9
@@ -230,29 +237,30 @@ INSTANT = 1e-9
 class Segment:
     """Frames first .. first + count of a key interval of `length` frames, light linear over the interval.
 
-    radiance0, radiance1: (H*W,) float32, light at the start and at the end of the whole interval.
-    rise: (H*W,) float32, of a frame with keys inside it, whose mean the two are: by how much more light there is at its
-    end than at its start, of the line with its first moment.  None elsewhere, where the two say so.
-    course: of such a frame, where it is asked for.
+    A frame with keys inside it is a segment of its own: the mean of its light at both ends, and its rise.
     """
 
-    radiance0: NDArray[np.float32]
-    radiance1: NDArray[np.float32]
+    radiance0: Pictures
+    """(H*W,), light at the start of the whole interval."""
+    radiance1: Pictures
+    """(H*W,), light at its end."""
     length: int
     first: int
     count: int
-    rise: NDArray[np.float32] | None = None
+    rise: Pictures | None = None
+    """(H*W,), of a frame with keys: from its start to its end, of the line with the first moment of its light."""
     course: LightWithinFrame | None = None
+    """Of a frame with keys, where requested."""
 
 
-def segments(
-    light: Keyframes | NDArray[np.float32], start: int, frames: int, courses: bool = False
-) -> Iterator[Segment]:
+def segments(light: Keyframes | Pictures, start: int, frames: int, courses: bool = False) -> Iterator[Segment]:
     """Cut frames start .. start + frames into segments.
 
-    light: keyframes, or one (H, W) picture held throughout.  How the stream is cut into calls changes no bit:
-    the ramps depend on the keys alone.  A frame with keys inside it is a segment of its own, with its course where
-    `courses` are asked for.
+    Ramps depend on the keys alone: no cut of the stream into calls changes a bit.
+
+    Args:
+        light: keyframes, or one (H, W) picture held throughout.
+        courses: give frames with keys inside their courses.
     """
     if not isinstance(light, Keyframes):
         yield from _held(light, start, start + frames)
@@ -276,12 +284,16 @@ KEY0, KEY1, BEGIN, LENGTH, FIRST, COUNT = range(6)
 
 
 @njit(cache=True, nogil=True)
-def cuts(times: NDArray[np.float64], start: int, stop: int) -> NDArray[np.int64]:
-    """How keys at `times` (K,) cut frames start .. stop into segments: (S, 6) int64, a row each.
+def cuts(times: Floats, start: int, stop: int) -> NDArray[np.int64]:
+    """Cut frames start .. stop into segments at keys.
 
-    KEY0, KEY1: the keys whose pictures are the light at its start and at its end; -1 where no key is at that frame.
-    BEGIN, LENGTH: of its key interval [frames]; a LENGTH of 0 is a frame with keys inside it.  FIRST, COUNT: which
-    frames of the interval.
+    Args:
+        times: of the keys (K,) [frames].
+
+    Returns:
+        (S, 6) int64, a row a segment.  KEY0, KEY1: keys whose pictures are its light at start and end, -1 where no key
+            is at that frame.  BEGIN, LENGTH: of its key interval [frames]; LENGTH 0 is a frame with keys inside it.
+            FIRST, COUNT: its frames of the interval.
     """
     rows = np.empty((16, 6), np.int64)
     used, at = 0, start
@@ -311,7 +323,7 @@ def cuts(times: NDArray[np.float64], start: int, stop: int) -> NDArray[np.int64]
 
 
 def _frame_with_keys(light: Keyframes, at: int) -> Segment:
-    """The frame from `at` on: the exact mean of its light, and its rise as far as a line of it stays above zero."""
+    """The frame from `at` on: the exact mean of its light, and its rise, limited so that the line stays above zero."""
     first, of_mean, of_rise = key_weights(light.frame, at, at + 1)
     if light.on_device:  # for an engine that goes by the mean alone
         exact: Any = zip(light.radiance[first:], of_mean.tolist(), strict=False)
@@ -333,7 +345,7 @@ def course(light: Keyframes, frame: int) -> LightWithinFrame:
     return LightWithinFrame(times, tuple(picture.reshape(-1) for picture in pictures))
 
 
-def _held(picture: NDArray[np.float32], at: int, stop: int) -> Iterator[Segment]:
+def _held(picture: Pictures, at: int, stop: int) -> Iterator[Segment]:
     flat = picture.reshape(-1)
     while at < stop:
         count = min(MAX_SEGMENT, stop - at)
@@ -343,17 +355,18 @@ def _held(picture: NDArray[np.float32], at: int, stop: int) -> Iterator[Segment]
 
 @dataclass(frozen=True)
 class Ramp:
-    """The integers of F(k) for every pixel of a segment: i0, B, and r / 2n in 2^-18 (see the module's equation).
-
-    own_rise: (P,) [grains/frame] of a frame with keys inside it; pieces: of such a frame, in thresholds and without
-    dark current, where its course is known.
-    """
+    """The integers of F(k) for every pixel of a segment: see the module's equation."""
 
     level: NDArray[np.int32]
+    """i0."""
     curve: NDArray[np.int32]
+    """B."""
     rest: NDArray[np.int32]
-    own_rise: NDArray[np.float32] | None = None
+    """r / 2n in 2^-18."""
+    own_rise: Pictures | None = None
+    """(P,) of a frame with keys inside it [grains/frame]."""
     pieces: tuple[Piece, ...] = ()
+    """Of such a frame with a known course, without dark current [thresholds]."""
 
     @cached_property
     def steady(self) -> bool:
@@ -361,8 +374,8 @@ class Ramp:
         return self.own_rise is None and not (self.curve.any() or self.rest.any())
 
     @property
-    def rise(self) -> NDArray[np.float64]:
-        """(P,) by how much more light there is at a frame's end than at its start [grains/frame]."""
+    def rise(self) -> Floats:
+        """Light at a frame's end minus light at its start (P,) [grains/frame]."""
         if self.own_rise is not None:
             return self.own_rise.astype(np.float64)
         return 2.0 * self.curve + self.rest * (1.0 / (1 << 17))
@@ -374,7 +387,7 @@ class Ramp:
         return grains
 
 
-def ramp(segment: Segment, gain: NDArray[np.float32], dark: NDArray[np.float32]) -> Ramp:
+def ramp(segment: Segment, gain: Pictures, dark: Pictures) -> Ramp:
     """Integrate one segment: gain [grains/frame at radiance 1] and dark [grains/frame] are (P,) float32."""
     i0 = _grains_per_frame(segment.radiance0, gain, dark)
     d = _grains_per_frame(segment.radiance1, gain, dark) - i0
@@ -385,12 +398,12 @@ def ramp(segment: Segment, gain: NDArray[np.float32], dark: NDArray[np.float32])
     return Ramp(i0, curve, rest, rise_of(segment, gain), pieces_of(segment, gain))
 
 
-def rise_of(segment: Segment, gain: NDArray[np.float32]) -> NDArray[np.float32] | None:
+def rise_of(segment: Segment, gain: Pictures) -> Pictures | None:
     """`Ramp.own_rise` of a segment."""
     return None if segment.rise is None else segment.rise * gain
 
 
-def pieces_of(segment: Segment, gain: NDArray[np.float32]) -> tuple[Piece, ...]:
+def pieces_of(segment: Segment, gain: Pictures) -> tuple[Piece, ...]:
     """`Ramp.pieces` of a segment."""
     if segment.course is None:
         return ()
@@ -403,17 +416,15 @@ def pieces_of(segment: Segment, gain: NDArray[np.float32]) -> tuple[Piece, ...]:
     )
 
 
-def _grains_per_frame(
-    radiance: NDArray[np.float32], gain: NDArray[np.float32], dark: NDArray[np.float32]
-) -> NDArray[np.int32]:
+def _grains_per_frame(radiance: Pictures, gain: Pictures, dark: Pictures) -> NDArray[np.int32]:
     with np.errstate(over="ignore"):  # infinity is capped too
-        capped: NDArray[np.float32] = np.minimum(radiance * gain + dark, np.float32(MAX_GRAINS_PER_FRAME))
+        capped: Pictures = np.minimum(radiance * gain + dark, np.float32(MAX_GRAINS_PER_FRAME))
     grains: NDArray[np.int32] = (capped + np.float32(0.5)).astype(np.int32)
     return grains
 
 
-def as_light(radiance: Keyframes | ArrayLike, shape: tuple[int, int]) -> Keyframes | NDArray[np.float32]:
-    """Check what a user gave as light against the sensor's shape; raises InputError."""
+def as_light(radiance: Keyframes | ArrayLike, shape: tuple[int, int]) -> Keyframes | Pictures:
+    """A user's light, checked against the sensor's shape; raises InputError."""
     if isinstance(radiance, Keyframes):
         if tuple(radiance.radiance.shape[1:]) != shape:
             raise InputError(f"radiance is {tuple(radiance.radiance.shape[1:])} pixels, the sensor is {shape}")
@@ -425,3 +436,19 @@ def as_light(radiance: Keyframes | ArrayLike, shape: tuple[int, int]) -> Keyfram
         )
     check_radiance(picture)
     return picture
+
+
+def same_light(a: Pictures, b: Pictures) -> bool:
+    """Whether two pictures have the same values, every pixel."""
+    if a.flags.c_contiguous and a.flags.writeable:
+        return bool(_same_words(a.view(np.uint32), b.view(np.uint32)))
+    return np.array_equal(a, b)
+
+
+@njit(cache=True, nogil=True, boundscheck=False)
+def _same_words(a: NDArray[np.uint32], b: NDArray[np.uint32]) -> bool:
+    use_widest_vectors()
+    different = np.uint32(0)
+    for i in range(a.size):
+        different |= np.uint32(a[i] ^ b[i])
+    return different == 0  # type: ignore[no-any-return]

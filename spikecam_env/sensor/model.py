@@ -51,14 +51,15 @@ class _ModelFile(Declared):
 
 @dataclass(frozen=True)
 class SensorModel:
-    """What kind of camera: circuit, frame rate and effects, in physical order whatever order they are given in.
+    """A kind of camera: circuit, frame rate and effects, in physical order whatever order they are given in.
 
-    Raises InputError for a frame rate outside its range, an effect listed twice, and where what effects do together
-    leaves no sensor: spreads or noise as large as what they spread.  So it does for a reference that moves too fast
-    within a frame.
+    Raises:
+        InputError: for a frame rate outside its range, an effect listed twice, a reference that moves too fast within a
+            frame, and effects that together leave no sensor: spreads or noise as large as the swing, for example.
 
-    >>> SensorModel.preset("scsim").without("shot_noise").effects[0].name
-    'conversion_gain_spread'
+    Example:
+        >>> SensorModel.preset("scsim").without("shot_noise").effects[0].name
+        'conversion_gain_spread'
     """
 
     name: str
@@ -90,9 +91,10 @@ class SensorModel:
 
     @classmethod
     def from_toml(cls, path: str | os.PathLike[str]) -> SensorModel:
-        """Read a model file; raises InputError for a missing file, broken TOML, unknown effect or parameter.
+        """Read a model file; effects of a user's own must be loaded before (`load_effects`).
 
-        Effects of a user's own must be loaded before (`load_effects`).
+        Raises:
+            InputError: for a missing file, broken TOML, unknown effect or parameter.
         """
         try:
             data = read_toml(os.fspath(path))
@@ -130,7 +132,7 @@ class SensorModel:
         write_text_whole(Path(path), self.toml())
 
     def toml(self) -> str:
-        """The model as the text of its file; effects of a user's own are said to need theirs."""
+        """The text of the model's file; a comment names the files of a user's own effects."""
         effects = [{"name": e.name, **e.parameters()} for e in self.effects]
         data = {
             "format": FORMAT,
@@ -146,30 +148,27 @@ class SensorModel:
         """This model with an effect added, or replaced where it has one of that name.
 
         Args:
-            effect: An instance of an effect's class, e.g. `DeadTime(tau_us=0.5)`.
-
-        Returns:
-            Another model; this one stays as it is.
+            effect: an instance of its class, e.g. `DeadTime(tau_us=0.5)`.
 
         Raises:
-            InputError: For anything else, such as a name or a class.
+            InputError: for anything else, such as a name or a class.
         """
         if not isinstance(effect, Effect):
             raise InputError(f"effect = {shown(effect)}; give an instance of its class, e.g. DeadTime(tau_us=0.5)")
         return replace(self, effects=(*(e for e in self.effects if e.name != effect.name), effect))
 
     def without(self, name: str) -> SensorModel:
-        """This model without one of its effects; raises InputError when it has none of that name."""
+        """This model without one of its effects; InputError when it has none of that name."""
         if name not in {e.name for e in self.effects}:
             raise unknown_name(f"effect of {self.name}", name, [e.name for e in self.effects])
         return replace(self, effects=tuple(e for e in self.effects if e.name != name))
 
     def difference(self, other: SensorModel) -> str:
-        """The first thing in which another model differs, as `what: this, that`; empty where only names do."""
+        """The first difference from another model, as `value: this, that`; empty where only names differ."""
         ours, theirs = _flat(self), _flat(other)
-        for what in ours | theirs:
-            if ours.get(what) != theirs.get(what):
-                return f"{what}: {ours.get(what, 'none')}, {theirs.get(what, 'none')}"
+        for name in ours | theirs:
+            if ours.get(name) != theirs.get(name):
+                return f"{name}: {ours.get(name, 'none')}, {theirs.get(name, 'none')}"
         return ""
 
     def noise_free(self) -> SensorModel:
@@ -177,10 +176,7 @@ class SensorModel:
         return replace(self, name="ideal", effects=())
 
     def draw_unit(self, shape: tuple[int, int], seed: int) -> Unit:
-        """One camera of this model: every effect leaves its fixed pattern, each from a stream of its own.
-
-        Adding or removing one effect leaves the draws of the others as they were.
-        """
+        """One camera of this model: every effect leaves its fixed pattern, each from a random stream of its own."""
         return firing_law(self._pixels(shape, lambda effect: generator(seed, effect.name))).owned()
 
     def _pixels(self, shape: tuple[int, int], generator_of: Callable[[Effect], np.random.Generator]) -> PixelArray:
@@ -198,7 +194,7 @@ def _flat(model: SensorModel) -> dict[str, Any]:
 
 
 def _in_physical_order(effects: Iterable[Effect]) -> tuple[Effect, ...]:
-    """Raises InputError for what is no effect of the catalogue, and for one that is listed twice."""
+    """The effects sorted; InputError for one that is not in the catalogue, or is listed twice."""
     listed = list(effects) if isinstance(effects, Iterable) else [effects]
     order = list(CATALOGUE)
     for effect in listed:

@@ -5,9 +5,9 @@
     load_installed_effects()                          those that packages offer, entry point group `spikecam.effects`
 
 Such a file is a program, and loading it runs it: load your own, or one that you would run.  A model file names effects
-and never loads any.  In the catalogue they are what all others are: options, models, candidates of a diagnosis.
-A model of them goes to other processes by itself: it is pickled with the file's path, and is refused there where the
-file is another by then.
+and never loads any.  In the catalogue they are like all others: options, parts of models, candidates of a diagnosis.
+A model of them can be sent to other processes: it is pickled with the file's path, and refused where that file has
+changed.
 """
 
 from __future__ import annotations
@@ -44,14 +44,17 @@ def load_effects(path: str | os.PathLike[str]) -> tuple[type[Effect], ...]:
     """Run an effect file and register its effects in CATALOGUE.
 
     Loading a file again changes nothing; loading it after it was edited replaces its effects.
-    Raises InputError for a file that cannot be read, fails when it is run (with the line), has no effect, declares one
-    wrongly (`check_declaration`), or names one as an effect of another file is named.
 
-    >>> from spikecam_env.sensor import beginning
-    >>> path = beginning.__path__[0] + "/new_effect.py"
-    >>> with effects_from():  # CATALOGUE is as before after the block
-    ...     [effect.name for effect in load_effects(path)]
-    ['new_effect']
+    Raises:
+        InputError: for a file that cannot be read, fails when it is run (with the line), or has no effect; and for an
+            effect that is declared wrongly (`check_declaration`) or has the name of one of another file.
+
+    Example:
+        >>> from spikecam_env.sensor import beginning
+        >>> path = beginning.__path__[0] + "/new_effect.py"
+        >>> with effects_from():  # CATALOGUE is as before after the block
+        ...     [effect.name for effect in load_effects(path)]
+        ['new_effect']
     """
     source = Path(os.path.abspath(path))
     module = _module_of(source, read_text(Path(path)))
@@ -70,15 +73,16 @@ def load_effects(path: str | os.PathLike[str]) -> tuple[type[Effect], ...]:
 
 @contextmanager
 def effects_from(*paths: str | os.PathLike[str]) -> Iterator[tuple[type[Effect], ...]]:
-    """The effects of these files in CATALOGUE within the block; afterwards it is what it was.
+    """The effects of these files in CATALOGUE within the block, and not after it.
 
-    >>> from spikecam_env.sensor import beginning
-    >>> path = beginning.__path__[0] + "/new_effect.py"
-    >>> with effects_from(path):
-    ...     "new_effect" in CATALOGUE
-    True
-    >>> "new_effect" in CATALOGUE
-    False
+    Example:
+        >>> from spikecam_env.sensor import beginning
+        >>> path = beginning.__path__[0] + "/new_effect.py"
+        >>> with effects_from(path):
+        ...     "new_effect" in CATALOGUE
+        True
+        >>> "new_effect" in CATALOGUE
+        False
     """
     before = dict(CATALOGUE)
     try:
@@ -90,8 +94,9 @@ def effects_from(*paths: str | os.PathLike[str]) -> Iterator[tuple[type[Effect],
 def load_installed_effects() -> tuple[type[Effect], ...]:
     """Register the effects that installed packages offer; one that fails is left out with a warning.
 
-    >>> load_installed_effects()  # no installed package offers effects
-    ()
+    Example:
+        >>> load_installed_effects()  # no installed package offers effects
+        ()
     """
     loaded: list[type[Effect]] = []
     for entry in metadata.entry_points(group=GROUP):
@@ -110,7 +115,8 @@ def load_installed_effects() -> tuple[type[Effect], ...]:
 def register(effect: type[Effect]) -> None:
     """Add an effect to CATALOGUE, in its physical order.
 
-    Raises InputError for what is no effect, is declared wrongly, or has the name of one from elsewhere.
+    Raises:
+        InputError: for a class of another kind, or one declared wrongly or with the name of an effect from elsewhere.
     """
     if not (isinstance(effect, type) and issubclass(effect, Effect) and effect is not Effect):
         raise InputError(f"{effect!r} is no class of Effect")
@@ -142,7 +148,7 @@ def source_of(effect: type[Effect]) -> str:
 
 
 def _module_of(source: Path, text: str) -> ModuleType:
-    """The file as a module: run once, whatever asks for it."""
+    """The file as a module, run once."""
     name = _MODULES + hashlib.sha256(f"{source}\0{text}".encode()).hexdigest()[:16]
     if name in sys.modules:
         return sys.modules[name]
@@ -182,7 +188,7 @@ def _set_catalogue(effects: dict[str, type[Effect]]) -> None:
 
 
 def _reduced(effect: Effect) -> tuple[Callable[..., Effect], tuple[Any, ...]]:
-    """How an effect of a user's own is pickled: by what its class is loaded from."""
+    """How an effect of a user's own is pickled: by the file or module of its class."""
     cls = type(effect)
     file = file_of(cls)
     return _revived, (file and str(file), cls.__module__, cls.name, effect.parameters())
@@ -192,7 +198,7 @@ def _revived(file: str | None, module: str, name: str, parameters: dict[str, Any
     if file is not None and module not in sys.modules:
         load_effects(file)
         if module not in sys.modules:
-            raise InputError(f"{file} is not what it was when {name} was saved; load it again and make the model anew")
+            raise InputError(f"{file} has changed since {name} was saved; load it again and make the model anew")
     [cls] = [effect for effect in _effects_in(importlib.import_module(module)) if effect.name == name]
     if name not in CATALOGUE:
         register(cls)

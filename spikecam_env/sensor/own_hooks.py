@@ -1,8 +1,8 @@
-"""Hooks of effects that are not of the package: what they return is checked, and what they raise says where.
+"""Hooks of effects that are not of the package: their values are checked, and their errors name effect and frame.
 
-`guard` replaces the hooks of a class once, when the class is made, so that every engine and every caller gets the
-checked ones, and the package's own effects pay nothing.  A hook gets read-only arrays: it cannot write into the
-camera.  Numpy's warnings are off within it, since each value it returns is checked.
+`guard` replaces the hooks of a class once, when the class is made: every caller gets checked hooks, and the package's
+own effects pay nothing.  A hook gets read-only arrays: it cannot write into the camera.  Numpy's warnings
+are off within it, since each returned value is checked.
 """
 
 from __future__ import annotations
@@ -23,17 +23,27 @@ from numpy.typing import NDArray
 from spikecam_env.checked import as_number
 from spikecam_env.errors import InputError, OwnCodeError, shown
 from spikecam_env.own_code import line_in, own_code
-from spikecam_env.sensor.effects.base import PACKAGE, Charge, Effect, ExposureBlock, Feedback, Few, Shift
+from spikecam_env.sensor.effects.base import (
+    NEW_CLASS_CHECKS,
+    PACKAGE,
+    Charge,
+    Effect,
+    ExposureBlock,
+    Feedback,
+    Few,
+    Shift,
+)
 from spikecam_env.sensor.ranges import check_parameters
 from spikecam_env.sensor.unit import UNIT_RANGES, PixelArray
+from spikecam_env.types import Masks, Pictures
 
 MOST = 1e9
 """Largest charge [thresholds], factor or voltage [mV] that a hook may return.  Engines end the charge of a frame at 128
 thresholds; products of such numbers stay finite."""
 
 MOST_LEAD = 2.0
-"""How long before the end of the array's frame a row may be read, less than so many frames: its light is that of two
-frames (`readout_skew`)."""
+"""Time from a row's read-out to the end of the array's frame, below so many frames: a row has light of two frames
+(`readout_skew`)."""
 
 _ANY = (-MOST, MOST)
 _FROM_ZERO = (0.0, MOST)
@@ -42,17 +52,16 @@ _CAPACITANCE_FF = (1e-6, MOST)
 
 @dataclass(frozen=True)
 class Call:
-    """One call of a hook, for the text of errors.
-
-    given: the arguments after `self`.  now: the frames it is called for, None for a hook that knows none.
-    """
+    """One call of a hook, for the text of errors."""
 
     effect: Effect
     hook: str
     given: tuple[Any, ...]
+    """The arguments after `self`."""
 
     @property
     def now(self) -> ExposureBlock | None:
+        """The frames of the call, None for a hook without."""
         return next((value for value in self.given if isinstance(value, ExposureBlock)), None)
 
     def frames(self) -> tuple[int, int]:
@@ -61,7 +70,7 @@ class Call:
         return (0, 0) if now is None else (math.floor((now.origin + now.number) * now.length + 1e-9), now.frames)
 
     def place(self, index: int | None = None) -> str:
-        """Effect, hook and frames in words.  index: of one frame within the call."""
+        """Effect, hook and frames in words, or the one frame of this index within the call."""
         first, count = self.frames()
         name = f"effect {self.effect.name}, {self.hook}"
         if count == 0:
@@ -70,13 +79,13 @@ class Call:
             return f"{name}, frame {first + (index or 0)}"
         return f"{name}, frames {first} to {first + count - 1}"
 
-    def error(self, said: str, index: int | None = None) -> OwnCodeError:
-        """The error of a value that it returned.  said: what the value is, and what is allowed."""
-        return OwnCodeError(f"{self.place(index)}: {said}")
+    def error(self, fault: str, index: int | None = None) -> OwnCodeError:
+        """The error of a returned value."""
+        return OwnCodeError(f"{self.place(index)}: {fault}")
 
 
 Check = Callable[[Call, Any], Any]
-"""Of what a hook returned: the same in the types that engines compute in, or an OwnCodeError."""
+"""A returned value in the types that engines compute in, or an OwnCodeError."""
 
 
 def guard(effect: type[Effect]) -> None:
@@ -95,8 +104,8 @@ def _checked_hook(hook: str, law: Any, check: Check) -> Callable[..., Any]:
         call = Call(self, hook, (*given, *named.values()))
         handed = [_read_only(value) for value in given]
         with own_code(lambda: _place_of_failure(call)), np.errstate(all="ignore"):
-            found = _bound(law, self)(*handed, **{name: _read_only(value) for name, value in named.items()})
-            return check(call, _as_given(found, handed, given))
+            value = _bound(law, self)(*handed, **{name: _read_only(value) for name, value in named.items()})
+            return check(call, _as_given(value, handed, given))
 
     checked.unchecked = law  # type: ignore[attr-defined]
     return checked
@@ -149,7 +158,7 @@ def _as_given(found: Any, handed: Iterable[Any], given: Iterable[Any]) -> Any:
 
 
 def _numbers(call: Call, value: Any, name: str, shape: tuple[int, ...], kind: str = "fiu") -> NDArray[Any]:
-    """An array of real numbers; each axis is as long as in `shape`, or 1.  kind: numpy's letters of allowed types."""
+    """An array of real numbers, or of numpy's letters `kind`; each axis is as long as in `shape`, or 1."""
     array = np.asarray(value)
     if np.ma.is_masked(value):
         raise call.error(f"{name} is an array with masked values; each must be a number, and not masked")
@@ -265,7 +274,7 @@ def _shift(call: Call, value: Any, factor: tuple[int, ...], millivolts: tuple[in
 
 def _imprint(call: Call, found: Any) -> PixelArray:
     before: PixelArray = call.given[0]
-    after: PixelArray = _instance(call, found, "what it returned", PixelArray)
+    after: PixelArray = _instance(call, found, "the value", PixelArray)
     if after.circuit is not before.circuit or after.frame_rate_hz != before.frame_rate_hz:
         raise call.error("it changed the circuit or the frame rate; leave them as they are")
     ranges = {
@@ -286,10 +295,10 @@ def _imprint(call: Call, found: Any) -> PixelArray:
     return replace(after, **values)
 
 
-def _image(call: Call, found: Any) -> NDArray[np.float32]:
+def _image(call: Call, found: Any) -> Pictures:
     picture = call.given[0]
     most = float(np.finfo(np.float32).max)
-    least = 0.0 if not picture.size or picture.min() >= 0.0 else -most  # what rises within a frame may fall
+    least = 0.0 if not picture.size or picture.min() >= 0.0 else -most  # a rise within a frame may be negative
     return np.array(_whole(call, found, "the picture", picture.shape, (least, most)), dtype=np.float32)
 
 
@@ -342,7 +351,7 @@ def _off_the_line(call: Call, found: Any) -> Any:
     return _number_or_field(call, found, "the charge", _block(call)[1:], _FROM_ZERO)
 
 
-def _read_out(call: Call, found: Any) -> tuple[NDArray[np.bool_], Any]:
+def _read_out(call: Call, found: Any) -> tuple[Masks, Any]:
     spikes, memory = _tuple(call, found, "spikes, memory")
     bits = _numbers(call, spikes, "spikes", _block(call), "b")
     if bits.shape != _block(call):
@@ -364,7 +373,7 @@ def _spiked(call: Call, found: Any) -> tuple[NDArray[Any], Any]:
 
 
 def _feedback(call: Call, found: Any) -> Feedback:
-    feedback: Feedback = _instance(call, found, "what it returned", Feedback)
+    feedback: Feedback = _instance(call, found, "the value", Feedback)
     checked = Feedback(**{name: _number(call, value, name, _ANY) for name, value in feedback._asdict().items()})
     if checked.left_tau <= 0.0:
         raise call.error(f"left_tau is {checked.left_tau:g}; it must be above 0 frames")
@@ -388,4 +397,6 @@ CHECKS: dict[str, Check] = {
     "spiked": _spiked,
     "feedback": _feedback,
 }
-"""What is checked of each hook."""
+"""Check of each hook's value."""
+
+NEW_CLASS_CHECKS.append(guard)

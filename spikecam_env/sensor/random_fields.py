@@ -1,4 +1,4 @@
-"""Random fields: a number for every pixel and frame, made by hashing both, so that no generator need be kept in step.
+"""Random fields: a number for every pixel and frame, a hash of both, so that no generator need be kept in step.
 
 White noise is the jump kernel's draw with the frame in the spike number's place; octaves are AR(1) processes on it.
 Numba's cache looks only at the file of the function it compiles: see `DRAWS`.
@@ -12,15 +12,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from spikecam_env.compiled import njit
-from spikecam_env.sensor.kernels.draws import GOLDEN, first_key, second_key, standard
-from spikecam_env.sensor.kernels.intrinsics import use_widest_vectors
-from spikecam_env.sensor.kernels.quantile import fitted_polynomial
-from spikecam_env.types import Pictures
+from spikecam_env.sensor.compiled_tools.draws import GOLDEN, first_key, second_key, standard
+from spikecam_env.sensor.compiled_tools.intrinsics import use_widest_vectors
+from spikecam_env.sensor.compiled_tools.quantile import fitted_polynomial
+from spikecam_env.types import Floats, Pictures
 
 Words = tuple[np.uint32, np.uint32]
-"""What fixes every draw of a field."""
+"""The key of every draw of a field."""
 
-DRAWS = 0x3BD9BCE3
+DRAWS = 0x98AA1746
 """Checksum of the draws compiled in: numba's cache sees a change of this file, not of those it imports from."""
 
 TILE = 1024
@@ -47,15 +47,23 @@ def octave_field(
     of: Sequence[Words],
     sigma: float,
     value: Pictures,
-    every: NDArray[np.float64],
-    kept: NDArray[np.float64],
+    every: Floats,
+    kept: Floats,
     first: int,
     frames: int,
 ) -> tuple[Pictures, Pictures]:
-    """The sum (frames, H, W) of AR(1) processes, and their values (octaves, H, W) after the last frame.
+    """The sum of AR(1) processes.
 
-    sigma: standard deviation of each.  value: before frame `first`.  Process j moves in frames that every[j] divides:
-    v <- kept v + sigma sqrt(1 - kept^2) n.
+    Process j moves in frames that every[j] divides: v <- kept v + sigma sqrt(1 - kept^2) n.
+
+    Args:
+        sigma: standard deviation of each.
+        value: of each before frame `first` (octaves, H, W).
+        every: frames between moves of each.
+        kept: autocorrelation of each from move to move.
+
+    Returns:
+        The sum (frames, H, W), and the values (octaves, H, W) after the last frame.
     """
     last = value.copy()
     total = np.empty((frames, *value.shape[1:]), dtype=np.float32)
@@ -80,10 +88,8 @@ def _normal(sigma: float) -> tuple[np.float32, ...]:
 
 
 @njit(cache=True, nogil=True, error_model="numpy", boundscheck=False)
-def _white(
-    low: np.uint32, high: np.uint32, first: int, polynomial: tuple[np.float32, ...], out: NDArray[np.float32]
-) -> None:
-    """out: (F, P) float32, overwritten."""
+def _white(low: np.uint32, high: np.uint32, first: int, polynomial: tuple[np.float32, ...], out: Pictures) -> None:
+    """Write a white field to out (F, P)."""
     use_widest_vectors()
     frames, pixels = out.shape
     key = np.empty((2, TILE), np.uint32)
@@ -101,14 +107,14 @@ def _white(
 def _octaves(
     words: NDArray[np.uint32],
     every: NDArray[np.int64],
-    kept: NDArray[np.float32],
-    driven: NDArray[np.float32],
+    kept: Pictures,
+    driven: Pictures,
     first: int,
     polynomial: tuple[np.float32, ...],
-    value: NDArray[np.float32],
-    total: NDArray[np.float32],
+    value: Pictures,
+    total: Pictures,
 ) -> None:
-    """value: (J, P) float32, updated.  total: (F, P) float32, overwritten.
+    """Write sums of octaves to total (F, P), and update value (J, P).
 
     Slow octaves are summed only when they move: above[j] is the sum of octaves j and slower.
     """

@@ -30,13 +30,16 @@ def parameter(
     periodic: bool = False,
     doc: str,
 ) -> Any:
-    """Declare a field: its default, unit, allowed range and meaning.
+    """Declare a field.
 
-    A default that is True or False makes a switch, a whole number a whole number, anything else a number.
-    bounds: lowest and highest value, both allowed; None for a switch.
-    largest: where the upper bound is infinite, the largest value besides infinity.
-    choices: of a name, those that it may be.
-    periodic: whether the bounds are the same value, as those of a phase are.
+    Args:
+        default: True or False makes a switch, a whole number a whole number, anything else a number.
+        unit: in words.
+        bounds: lowest and highest value, both allowed; None for a switch.
+        largest: where the upper bound is infinite, the largest value besides infinity.
+        choices: of a name, its allowed values.
+        periodic: whether the bounds are the same value, as those of a phase are.
+        doc: its meaning.
     """
     return dataclasses.field(
         default=default,
@@ -54,7 +57,8 @@ def parameter(
 def check_parameters(owner: Any, name: str) -> None:
     """Check every declared field of a frozen dataclass, and keep its value as plain bool, int, float or str.
 
-    Raises InputError, `name.field = value ...`, for a value of another kind or outside its range.
+    Raises:
+        InputError: `name.field = value ...`, for a value of another kind or outside its range.
     """
     for field in dataclasses.fields(owner):
         if "bounds" in field.metadata:
@@ -63,8 +67,7 @@ def check_parameters(owner: Any, name: str) -> None:
 
 
 def range_text(field: dataclasses.Field[Any]) -> str:
-    """The allowed range of a declared field in words, without its unit: `0 .. 1`, `2 .. 1e+12 or inf`, `this or that`;
-    empty for a switch."""
+    """Allowed range of a declared field in words, without its unit, like `2 .. 1e+12 or inf`; empty for a switch."""
     if field.metadata["choices"]:
         return " or ".join(field.metadata["choices"])
     bounds, largest = field.metadata["bounds"], field.metadata["largest"]

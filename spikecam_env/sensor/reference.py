@@ -6,8 +6,8 @@
 Reset is asynchronous: charge after the crossing is kept.  A frame reports one bit; further crossings in it are lost.
 Where references move within the frame (`crossing`), a pixel fires when it is first at its own.
 However far noise and effects go, a frame brings MOST_GRAINS at most and a comparator trips at LEAST_LIMIT at least.
-Charge is in grains of the pixel's own threshold (`light`), so without noise all sums are exact integers.  Effects see
-it in thresholds, a power of two away, so that to go there and back changes no bit.
+Charge is in grains of the pixel's own threshold (`light`), so without noise all sums are exact integers.  Effects get
+it in thresholds, a power of two away, so that the conversion changes no bit.
 """
 
 from __future__ import annotations
@@ -26,31 +26,33 @@ from spikecam_env.sensor.effects.base import Effect, ExposureBlock, having
 from spikecam_env.sensor.light import GRAINS, LEAST_LIMIT, MOST_GRAINS, Piece, Segment, on_grid, ramp
 from spikecam_env.sensor.model import generator
 from spikecam_env.sensor.unit import Unit
-from spikecam_env.types import Floats
+from spikecam_env.types import Floats, Masks, Spikes
 
 
 @dataclass
 class ReferenceState:
-    """charge, threshold: (P,) float64 [grains]; rng: the pixels' own temporal noise; frame: number of the next.
-
-    missed: (P,) charge taken off at a reset for light that falls while the node is held, as far as as much has not yet
-    arrived since, which it does without noise.  memory: what each effect remembers, by its name.
-    """
+    """Pixels mid-stream, (P,) float64 [grains]."""
 
     charge: Floats
     threshold: Floats
     missed: Floats
+    """Charge taken off at resets for light that falls while the node is held; as much of later light has no noise."""
     rng: np.random.Generator
+    """Of the pixels' own temporal noise."""
     frame: int
+    """Number of the next."""
     memory: drive.Memory
 
 
 def start(
     first: ExposureBlock, effects: Sequence[Effect], phase: Floats, seed: int, unit_seed: int | None = None
 ) -> ReferenceState:
-    """Pixels part-way through a cycle: phase (P,) in [0, 1) is the share of the nominal threshold collected.
+    """Pixels part-way through a cycle.
 
-    seed: of the temporal noise.  unit_seed: of what effects draw once a unit, where it is another.
+    Args:
+        phase: (P,) in [0, 1), share of the nominal threshold collected.
+        seed: of the temporal noise.
+        unit_seed: of draws of effects once a unit, where it is another.
     """
     rng = generator(seed, "temporal")
     threshold = draw_threshold(first.unit.kappa, rng)
@@ -58,8 +60,8 @@ def start(
     return ReferenceState(np.floor(phase * GRAINS), threshold, np.zeros(phase.size), rng, first.number, memory)
 
 
-def run(first: ExposureBlock, effects: Sequence[Effect], state: ReferenceState, segment: Segment) -> NDArray[np.uint8]:
-    """Advance `state` over a segment; returns spikes (count, P) uint8.  first, effects: as given to `start`."""
+def run(first: ExposureBlock, effects: Sequence[Effect], state: ReferenceState, segment: Segment) -> Spikes:
+    """Spikes (count, P) uint8 of a segment; advances `state`.  The first frame and effects are those of `start`."""
     light = ramp(segment, *first.unit.grains_per_frame)
     spikes = np.zeros((segment.count, first.unit.gain.size), dtype=np.uint8)
     before = light.collected(segment.first)
@@ -79,9 +81,14 @@ def step(
     mean: Floats,
     rise: Floats,
     pieces: Sequence[Piece] = (),
-) -> NDArray[np.bool_]:
-    """One frame: `mean` (P,) is its expected charge [grains], which rises by `rise` (P,) from its start to its end, in
-    `pieces` where its light bends; returns which pixels report a spike (P,)."""
+) -> Masks:
+    """One frame; returns which pixels report a spike (P,).
+
+    Args:
+        mean: expected charge (P,) [grains].
+        rise: of that charge from the frame's start to its end (P,).
+        pieces: of the frame, where its light bends.
+    """
     light, dark = drive.expected_charge(now, effects, state.memory, mean / GRAINS, rise / GRAINS, pieces)
     dark_grains = np.clip(dark.values[0].reshape(-1) * GRAINS, 0.0, MOST_GRAINS)
     mean = np.minimum(np.maximum(light.values[0], 0.0).reshape(-1) * GRAINS + dark_grains, MOST_GRAINS)
@@ -106,8 +113,8 @@ def step(
     return drive.read_out(now, effects, state.memory, fired[None]).reshape(-1)
 
 
-def spiked(effect: Effect, now: ExposureBlock, state: ReferenceState, gained: Floats, fired: NDArray[np.bool_]) -> None:
-    """What an effect does to the charge (P,) when it is known which pixels fired (H, W); gained: in the frame."""
+def spiked(effect: Effect, now: ExposureBlock, state: ReferenceState, gained: Floats, fired: Masks) -> None:
+    """Change charge by an effect, given the pixels that fired (H, W) and the charge (P,) gained in the frame."""
     charge, rate = thresholds(state.charge, now), thresholds(gained, now)
     charge, state.memory[effect.name] = effect.spiked(charge, fired, rate, now, state.memory[effect.name])
     state.charge = charge.reshape(-1) * GRAINS
@@ -118,14 +125,17 @@ def crossed_again(
     effects: Sequence[Effect],
     state: ReferenceState,
     mean: Floats,
-    fired: NDArray[np.bool_],
+    fired: Masks,
     law: drive.Comparators,
-) -> NDArray[np.bool_]:
-    """Reset those of the pixels that fired (H, W) that what a reset left takes to their threshold once more; returns
-    which did.  Their bit is set already."""
+) -> Masks:
+    """Of the pixels that fired (H, W), reset those that charge left by a reset takes to their threshold again.
+
+    Returns:
+        These pixels (H, W), whose bit is set already.
+    """
     compared = references(now, effects, state, law)
     limit = compared(state.threshold)
-    again: NDArray[np.bool_] = fired.reshape(-1) & (state.charge >= limit)
+    again: Masks = fired.reshape(-1) & (state.charge >= limit)
     pixels = np.flatnonzero(again)
     reset(now, effects, state, mean, limit[pixels], pixels)
     state.threshold[pixels] = draw_threshold(now.unit.kappa[pixels], state.rng)
@@ -133,7 +143,7 @@ def crossed_again(
 
 
 def thresholds(grains: Floats, now: ExposureBlock) -> Floats:
-    """Charge (P,) [grains] as effects see it: (H, W) [thresholds]."""
+    """Charge (P,) [grains] in the unit of effects: (H, W) [thresholds]."""
     return (grains / GRAINS).reshape(now.shape)
 
 
@@ -149,7 +159,7 @@ def collect(unit: Unit, mean: Floats, dark: Floats, missed: Floats, rng: np.rand
 def references(
     now: ExposureBlock, effects: Sequence[Effect], state: ReferenceState, law: drive.Comparators
 ) -> Callable[[Floats], Floats]:
-    """What the comparators compare with in this frame, as a function of the thresholds (P,) [grains]."""
+    """Levels (P,) [grains] at which the comparators trip in this frame, as a function of the thresholds (P,)."""
     if not having("compare", effects) and not having("react", effects):
         return lambda threshold: np.maximum(threshold, LEAST_LIMIT)
     return partial(compared_with, now, effects, state, law, law.factor.T, law.common.T)
@@ -164,7 +174,7 @@ def compared_with(
     common: Floats,
     threshold: Floats,
 ) -> Floats:
-    """What pixels of these thresholds compare with (P,) [grains], where factor and common (H or 1, 1) [mV] stand so."""
+    """Levels (P,) [grains] of pixels of these thresholds, given factor and common (H or 1, 1) [mV]."""
     factor, common = (np.broadcast_to(rows, now.shape).reshape(-1) for rows in (factor, common))
     limit = thresholds(threshold * factor + law.grains_per_mV * (common + law.field[0]), now)
     for effect in having("react", effects):
@@ -178,7 +188,7 @@ def fire(
     state: ReferenceState,
     mean: Floats,
     compared_with: Callable[[Floats], Floats],
-) -> NDArray[np.bool_]:
+) -> Masks:
     """Reset every pixel that is at its threshold until none is; returns which fired (P,)."""
     fired = np.zeros(mean.size, dtype=np.bool_)
     limit = compared_with(state.threshold)
@@ -199,12 +209,17 @@ def fire_in_turn(
     mean: Floats,
     gained: Floats,
     law: drive.Comparators,
-) -> NDArray[np.bool_]:
+) -> Masks:
     """As `fire`, in the order of the moments at which pixels are at their references, which may move within the frame.
 
-    The charge gained (P,) comes evenly over the frame.  Each spike kicks its neighbours at its moment (`Feedback`).
-    Charge is put on a grid on which sums are the same in any order.  The thresholds after a first reset are drawn for
-    all pixels at once, since what one is compared with takes as long to work out as what all are.
+    Each spike kicks its neighbours at its moment (`Feedback`).  Charge is put on a grid on which sums are the same in
+    any order.  The thresholds after a first reset are drawn for all pixels at once: levels of one pixel take as long to
+    compute as those of all.
+
+    Args:
+        mean: expected charge of the frame (P,) [grains].
+        gained: charge of the frame (P,) [grains], evenly over it.
+        law: of the comparators, moving within the frame.
     """
     state.charge, gained = on_grid(state.charge), on_grid(gained)
     state.charge += gained
@@ -252,8 +267,7 @@ def fire_in_turn(
 def nodes(
     now: ExposureBlock, effects: Sequence[Effect], state: ReferenceState, law: drive.Comparators
 ) -> tuple[list[list[float]], Callable[[Floats], Floats]]:
-    """Moments of each row at which the references are known, n each, and what thresholds (P,) [grains] are compared
-    with at each (n, P)."""
+    """Moments of each row at which the references are known, n each, and levels (n, P) as a function of thresholds."""
     sway = law.sway
     assert sway is not None
     moves = [(sway.factor[0, :, k, None], sway.common[0, :, k, None]) for k in range(sway.at.shape[1])]

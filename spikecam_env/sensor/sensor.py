@@ -11,7 +11,7 @@ from types import ModuleType
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from spikecam_env.checked import LARGEST_DERIVED_SEED, checked_count, checked_seed, checked_shape
 from spikecam_env.errors import InputError, shown, unknown_name
@@ -21,11 +21,11 @@ from spikecam_env.sensor.drive import wants_pieces
 from spikecam_env.sensor.effects.base import ExposureBlock
 from spikecam_env.sensor.imaging import Imaging
 from spikecam_env.sensor.kernels import ahead, block, fast
-from spikecam_env.sensor.kernels.stretches import stretches
-from spikecam_env.sensor.light import Keyframes, Segment, as_light, real_numbers, segments, warn_beside
+from spikecam_env.sensor.light import Keyframes, Segment, as_light, real_numbers, segments, warn_outside
 from spikecam_env.sensor.model import SensorModel, generator
 from spikecam_env.sensor.unit import UNIT_RANGES, Unit
 from spikecam_env.threads import share_out
+from spikecam_env.types import Floats, Pictures, Spikes
 
 ENGINES = ("auto", "cuda", "fast", "reference")
 BENT_LIGHT = ("refuse", "allow")
@@ -35,49 +35,54 @@ BENT_LIGHT = ("refuse", "allow")
 class SensorState:
     """A sensor mid-stream: which unit it is, the next frame, and its pixels.  Picklable.
 
-    Tied to its engine, its shape, its model, and the unit that was given to the sensor, if one was.
-    unit: that one's digest.  phase: read-only.
-
-    >>> sensor, light = SpikeSensor(SensorModel.preset("scsim"), shape=(4, 4), seed=0), np.full((4, 4), 0.3)
-    >>> state = sensor.state()
-    >>> spikes = sensor.step(light, frames=32)
-    >>> sensor.restore(state)
-    >>> bool((sensor.step(light, frames=32) == spikes).all())
-    True
+    Example:
+        >>> sensor, light = SpikeSensor(SensorModel.preset("scsim"), shape=(4, 4), seed=0), np.full((4, 4), 0.3)
+        >>> state = sensor.state()
+        >>> spikes = sensor.step(light, frames=32)
+        >>> sensor.restore(state)
+        >>> bool((sensor.step(light, frames=32) == spikes).all())
+        True
     """
 
     engine: str
     shape: tuple[int, int]
     model: SensorModel
     unit: str | None
+    """Digest of the unit that was given to the sensor, if one was."""
     seed: int
     frame: int
-    phase: NDArray[np.float64]
+    phase: Floats
+    """Read-only."""
     pixels: Any
 
 
 class SpikeSensor:
-    """A spike camera of `shape` (rows, columns) pixels.
+    """A spike camera that you can step.
 
-    model: what kind of camera; a SensorModel, a preset's name or a TOML path.
-    seed: which unit of it (fixed pattern), its starting phase and its temporal noise; same seed, same bits,
-        for any cutting of the stream into steps and any number of threads.
-    engine: "fast" (numba; random numbers only per spike), "reference" (numpy; the specification), "cuda" (a GPU, bits
-        of fast, no effects from frame to frame; for many cameras at once see SpikeSensorBatch), or "auto" (fast where
-        it carries every effect of the model, else reference).
-    take: another recording by the same unit: other starting phase, other temporal noise.
-    unit: a camera's own firing law, as measured, in place of one drawn from the model.  The model's fixed patterns and
-        noise strengths are then not used; its optics and what its effects do from frame to frame are.
-    threads: of the fast engine, default NUMBA_NUM_THREADS; one where several cameras run at once.
-    bent_light: "refuse" (the default) films with keys inside a frame where an effect of the model would be off by more
-        than 1 % of that frame's charge (`bent_light.py`), or "allow" them.
-    Raises InputError for an unknown engine, a shape that is not two positive whole numbers, a negative seed, for
-    engine="fast" or "cuda" with an effect that it does not carry, for engine="cuda" without a CUDA device, and for a
-    unit of another number of pixels or with values that are no firing law.
+    Args:
+        model: kind of camera; a SensorModel, a preset's name or a TOML path.
+        shape: (rows, columns) of pixels.
+        seed: which unit of it (fixed pattern), its starting phase and its temporal noise; same seed, same bits,
+            for any cutting of the stream into steps and any number of threads.
+        engine: "fast" (numba; random numbers only per spike), "reference" (numpy; the specification), "cuda" (a GPU,
+            bits of fast, no effects from frame to frame; for many cameras at once see SpikeSensorBatch), or "auto"
+            (fast where it carries every effect of the model, else reference).
+        take: another recording by the same unit: other starting phase, other temporal noise.
+        unit: a camera's own firing law, as measured, in place of one drawn from the model.  Optics and effects from
+            frame to frame are still the model's; its fixed patterns and noise strengths are not used.
+        threads: of the fast engine, default NUMBA_NUM_THREADS; one where several cameras run at once.
+        bent_light: "refuse" films with keys inside a frame where an effect of the model would be off by more
+            than 1 % of that frame's charge (`bent_light.py`), or "allow" them.
 
-    >>> sensor = SpikeSensor(SensorModel.preset("ideal"), shape=(2, 2), seed=0)
-    >>> sensor.step(np.full((2, 2), 0.25, np.float32), frames=8).sum(axis=0).tolist()
-    [[2, 2], [2, 2]]
+    Raises:
+        InputError: for an unknown engine, one that does not carry an effect of the model, or "cuda" without a device;
+            for a shape that is not two positive whole numbers and a negative seed; and for a unit of another number of
+            pixels or with values that are no firing law.
+
+    Example:
+        >>> sensor = SpikeSensor(SensorModel.preset("ideal"), shape=(2, 2), seed=0)
+        >>> sensor.step(np.full((2, 2), 0.25, np.float32), frames=8).sum(axis=0).tolist()
+        [[2, 2], [2, 2]]
     """
 
     def __init__(
@@ -110,16 +115,21 @@ class SpikeSensor:
         """Back to frame 0; with a seed, as another unit, or as another recording of the unit that was given."""
         self._start(self.seed if seed is None else _checked(seed), phase=None)
 
-    def step(
-        self, radiance: Keyframes | ArrayLike, frames: int = 1, *, out: NDArray[np.uint8] | None = None
-    ) -> NDArray[np.uint8]:
-        """Expose the next frames; returns spikes (frames, H, W) uint8, 0 or 1.
+    def step(self, radiance: Keyframes | ArrayLike, frames: int = 1, *, out: Spikes | None = None) -> Spikes:
+        """Expose the next frames.
 
-        out: an array of that kind, C-contiguous, to be overwritten: fresh memory costs as much as the simulation.
+        Args:
+            radiance: (H, W) held throughout, or Keyframes on the stream's absolute frame numbers; 1.0 makes the nominal
+                pixel fire once a frame.
+            frames: how many.
+            out: array for the spikes, C-contiguous: fresh memory costs as much as the simulation.
 
-        radiance: (H, W) held throughout, or Keyframes on the stream's absolute frame numbers; 1.0 makes the nominal
-        pixel fire once a frame.  Raises InputError for a wrong shape, NaN, infinity, negative light, frames < 1, and
-        light that bends within a frame where `bent_light` says so; the camera is then as it was.
+        Returns:
+            Spikes (frames, H, W) uint8, 0 or 1.
+
+        Raises:
+            InputError: for a wrong shape, NaN, infinity, negative light, frames < 1, and, unless allowed, light that
+                bends within a frame; the camera is then as it was.
         """
         return step_together([self], [radiance], frames, outs=[out], threads=self.threads)[0]
 
@@ -130,9 +140,9 @@ class SpikeSensor:
         return SensorState(self.engine, self.shape, self.model, unit, self.seed, self.frame, self.phase, pixels)
 
     def restore(self, state: SensorState) -> None:
-        """Go on from a saved state; raises InputError for that of another engine, shape, model or unit."""
+        """Go on from a saved state; InputError for that of another engine, shape, model or unit."""
         if not isinstance(state, SensorState):
-            raise InputError(f"state is a {type(state).__name__}; it must be what SpikeSensor.state() returns")
+            raise InputError(f"state is a {type(state).__name__}; give one of SpikeSensor.state()")
         if not all(hasattr(state, f.name) for f in fields(SensorState)):
             raise InputError("this state was saved by another version of spikecam-env; record it again")
         if (state.engine, state.shape) != (self.engine, self.shape):
@@ -162,9 +172,9 @@ class SpikeSensor:
 
     _pixels: Any
     _film: Keyframes | None = None
-    """That of the last step: one that is over may be meant to stand still, one that is new and over is doubted."""
+    """Of the last step: a film that has ended may be held on purpose; a new one that has ended gets a warning."""
 
-    def _start(self, seed: int, phase: NDArray[np.float64] | None) -> None:
+    def _start(self, seed: int, phase: Floats | None) -> None:
         self.seed = seed
         self.frame = 0
         self.unit, unit_seed = self._given or (self.model.draw_unit(self.shape, seed), seed)
@@ -183,9 +193,9 @@ class SpikeSensor:
         else:
             self._pixels = reference.start(self._first_exposure(), self._frame_effects, flat, noise_seed, unit_seed)
 
-    def _exposing(
-        self, radiance: Keyframes | ArrayLike, frames: int, out: NDArray[np.uint8] | None = None
-    ) -> _Exposing:
+    def _step_arguments(
+        self, radiance: Keyframes | ArrayLike, frames: int, out: Spikes | None = None
+    ) -> _StepArguments:
         """The arguments of `step`, checked; nothing is exposed yet."""
         frames = checked_count(frames)
         light = as_light(radiance, self.shape)
@@ -195,29 +205,29 @@ class SpikeSensor:
             bent.check_bent(light, self.frame, frames, self._first_exposure(), self._frame_effects, self._imaging.image)
         spikes = _recycled(out, (frames, *self.shape), light).reshape(frames, -1)
         if light is not self._film:
-            warn_beside(light, self.frame, frames)
+            warn_outside(light, self.frame, frames)
         jumps = self.engine == "fast" and not self._frame_effects
-        return _Exposing(self, light, spikes, jumps and frames > ahead.FEW and self._pixels.ready is None)
+        return _StepArguments(self, light, spikes, jumps and frames > ahead.SHORT_CALL and self._pixels.ready is None)
 
-    def _expose(self, given: _Exposing) -> None:
-        """What was asked for, by this camera alone."""
+    def _expose(self, given: _StepArguments) -> None:
+        """Expose this camera by itself."""
         light, spikes = given.light, given.spikes
-        seen = map(self._imaging.seen, segments(light, self.frame, len(spikes), self._wants_courses))
+        images = map(self._imaging.segment_image, segments(light, self.frame, len(spikes), self._wants_courses))
         if self.engine == "fast" and self._frame_effects:
-            block.run(self._first_exposure(), self._frame_effects, self._pixels, seen, spikes, threads=self.threads)
+            block.run(self._first_exposure(), self._frame_effects, self._pixels, images, spikes, threads=self.threads)
             return
         done = 0
-        for segment in seen:
+        for segment in images:
             self._run(segment, spikes[done : done + segment.count])
             done += segment.count
 
-    def _exposed(self, given: _Exposing) -> NDArray[np.uint8]:
-        """The spikes (frames, H, W), once they are there."""
+    def _finish(self, given: _StepArguments) -> Spikes:
+        """Count the frames of a finished exposure; returns its spikes (frames, H, W)."""
         self._film = given.light if isinstance(given.light, Keyframes) else None
         self.frame += len(given.spikes)
         return given.spikes.reshape(-1, *self.shape)
 
-    def _run(self, segment: Segment, out: NDArray[np.uint8]) -> None:
+    def _run(self, segment: Segment, out: Spikes) -> None:
         if self.engine == "fast":
             ahead.run(self._pixels, segment, out, threads=self.threads)
         elif self.engine == "cuda":
@@ -232,21 +242,20 @@ class SpikeSensor:
 
 
 @dataclass(frozen=True)
-class _Exposing:
-    """What a camera is about to expose: its light, checked, and where the spikes (frames, P) go.
-
-    together: whether pixels go from spike to spike by themselves, so that many cameras go in one call.
-    """
+class _StepArguments:
+    """The arguments of `step`, checked."""
 
     sensor: SpikeSensor
-    light: Keyframes | NDArray[np.float32]
-    spikes: NDArray[np.uint8]
+    light: Keyframes | Pictures
+    spikes: Spikes
+    """(frames, P), to be written."""
     together: bool
+    """Whether pixels go from spike to spike by themselves, so that many cameras go in one call."""
 
     def stretches(self) -> Iterator[fast.Stretch]:
-        """What the fast engine is to do, 64 frames at a time."""
+        """Work of the fast engine, 64 frames at a time."""
         sensor = self.sensor
-        return stretches(sensor._pixels.pixels, self.light, sensor.frame, sensor._imaging, self.spikes)
+        return fast.stretches(sensor._pixels.pixels, self.light, sensor.frame, sensor._imaging, self.spikes)
 
 
 def step_together(
@@ -254,31 +263,42 @@ def step_together(
     radiances: Sequence[Keyframes | ArrayLike],
     frames: int = 1,
     *,
-    outs: Sequence[NDArray[np.uint8] | None] | None = None,
+    outs: Sequence[Spikes | None] | None = None,
     threads: int | None = None,
-) -> list[NDArray[np.uint8]]:
-    """Expose the next frames of every camera, each in its own light: as many (frames, H, W) uint8.
+) -> list[Spikes]:
+    """Expose the next frames of every camera, each in its own light, with the bits of each camera by itself.
 
-    Arguments as of `SpikeSensor.step`, one a camera; the bits are those of each camera by itself.  Cameras of the fast
-    engine without effects from frame to frame are stepped in one compiled call, whose threads share all pixels; others
-    a camera a thread.
-    threads: default NUMBA_NUM_THREADS.
-    Raises InputError as `SpikeSensor.step` does; all cameras are then as they were.
+    Cameras of the fast engine without effects from frame to frame are stepped in one compiled call, whose threads share
+    all pixels; others a camera a thread.
 
-    >>> cameras = [SpikeSensor(SensorModel.preset("ideal"), shape=(2, 2), seed=seed) for seed in (0, 1)]
-    >>> lights = [np.full((2, 2), 0.25), np.full((2, 2), 0.5)]
-    >>> [int(spikes.sum()) for spikes in step_together(cameras, lights, frames=8)]
-    [8, 16]
+    Args:
+        sensors: the cameras.
+        radiances: as of `SpikeSensor.step`, one a camera.
+        frames: how many.
+        outs: as of `SpikeSensor.step`, one a camera.
+        threads: default NUMBA_NUM_THREADS.
+
+    Returns:
+        Spikes (frames, H, W) uint8 of each camera.
+
+    Raises:
+        InputError: as `SpikeSensor.step` does; all cameras are then as they were.
+
+    Example:
+        >>> cameras = [SpikeSensor(SensorModel.preset("ideal"), shape=(2, 2), seed=seed) for seed in (0, 1)]
+        >>> lights = [np.full((2, 2), 0.25), np.full((2, 2), 0.5)]
+        >>> [int(spikes.sum()) for spikes in step_together(cameras, lights, frames=8)]
+        [8, 16]
     """
     given = [
-        sensor._exposing(radiance, frames, out)
+        sensor._step_arguments(radiance, frames, out)
         for sensor, radiance, out in zip(sensors, radiances, outs or [None] * len(sensors), strict=True)
     ]
     for stretches_now in zip_longest(*(one.stretches() for one in given if one.together)):
         fast.run_together([stretch for stretch in stretches_now if stretch is not None], threads=threads)
     alone = [one for one in given if not one.together]
     share_out(lambda number: alone[number].sensor._expose(alone[number]), len(alone), threads)
-    return [one.sensor._exposed(one) for one in given]
+    return [one.sensor._finish(one) for one in given]
 
 
 def _frame_effects(model: SensorModel) -> str:
@@ -286,7 +306,7 @@ def _frame_effects(model: SensorModel) -> str:
     return ", ".join(e.name for e in model.effects if not e.is_fixed()) or "none"
 
 
-def _read_only(array: NDArray[np.float64]) -> NDArray[np.float64]:
+def _read_only(array: Floats) -> Floats:
     """The array, or a copy of one that can be written to; as two sensors may share it."""
     if array.flags.writeable:
         array = array.copy()
@@ -294,9 +314,7 @@ def _read_only(array: NDArray[np.float64]) -> NDArray[np.float64]:
     return array
 
 
-def _recycled(
-    out: NDArray[np.uint8] | None, shape: tuple[int, int, int], light: Keyframes | NDArray[np.float32]
-) -> NDArray[np.uint8]:
+def _recycled(out: Spikes | None, shape: tuple[int, int, int], light: Keyframes | Pictures) -> Spikes:
     if out is None:
         try:
             return np.empty(shape, dtype=np.uint8)
@@ -316,7 +334,7 @@ def _checked(seed: Any) -> int:
 
 
 def checked_unit(unit: Any, shape: tuple[int, int]) -> Unit:
-    """The unit, read-only; raises InputError unless it is a firing law of rows * columns pixels."""
+    """The unit, read-only; InputError unless it is a firing law of rows * columns pixels."""
     if not isinstance(unit, Unit):
         raise InputError(f"unit = {type(unit).__name__}; it must be a Unit (spikecam_env.sensor.Unit)")
     for name in ("shot", "dark_is_noisy"):
@@ -356,5 +374,5 @@ def _chosen_engine(engine: str, model: SensorModel, unit: Unit | None) -> str:
 
 
 def _cuda() -> ModuleType:
-    """Imported when first asked for: torch takes seconds."""
+    """The module, imported when first needed: torch takes seconds."""
     return import_module("spikecam_env.sensor.kernels.cuda")

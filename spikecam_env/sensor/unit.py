@@ -13,11 +13,11 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from spikecam_env.errors import InputError
 from spikecam_env.sensor.light import GRAINS
 from spikecam_env.sensor.ranges import check_parameters, parameter
+from spikecam_env.types import Floats, Pictures
 
 ELEMENTARY_CHARGE_C = 1.602176634e-19
 BOLTZMANN_J_PER_K = 1.380649e-23
@@ -26,14 +26,13 @@ SWING_V = (0.05, 20.0)
 """Lowest and highest swing of a circuit.  Below, a comparator's own offset (published spread 49.7 mV) is the swing."""
 
 LEAST_SHARE = 0.01
-"""What a spread over pixels leaves a pixel of the nominal swing or capacitance, at least."""
+"""Smallest swing or capacitance of a pixel over nominal, whatever the spread."""
 
 MOST_SPREAD = 0.5
-"""Standard deviation over pixels of swing or capacitance over nominal, at most: one pixel in forty is then at none."""
+"""Largest standard deviation over pixels of swing or capacitance over nominal: one pixel in forty is then at none."""
 
 MOST_KAPPA = 0.25
-"""Reset noise over the swing, at most.  A threshold is a charge: four standard deviations below its mean it would be
-negative."""
+"""Largest reset noise over the swing: a threshold, a charge, is negative from four standard deviations on."""
 
 FEWEST_ELECTRONS = 1.0
 """Electrons to a threshold, at least."""
@@ -44,11 +43,14 @@ class Circuit:
     """The nominal pixel circuit, paper (6) and (12).
 
     Threshold phi = C (V_D - V_ref + V_bias).  Defaults: the public SCSim script's constants.
-    Raises InputError for a value outside its range, and for a swing outside SWING_V.
 
-    >>> circuit = Circuit()
-    >>> round(circuit.swing_V, 4), round(circuit.threshold_electrons)
-    (1.0924, 29646)
+    Raises:
+        InputError: for a value outside its range, and for a swing outside SWING_V.
+
+    Example:
+        >>> circuit = Circuit()
+        >>> round(circuit.swing_V, 4), round(circuit.threshold_electrons)
+        (1.0924, 29646)
     """
 
     reset_V: float = parameter(3.3, unit="V", bounds=(-20.0, 20.0), doc="voltage that a reset leaves")
@@ -88,22 +90,21 @@ _OF_RESETS = "the noise of a reset (reset_noise, excess_threshold_noise)"
 
 @dataclass(frozen=True)
 class PixelArray:
-    """The array in circuit units, as the effects leave their fixed pattern on it; arrays are (H, W) float64.
-
-    swing_spread_V, capacitance_spread_fF: standard deviations over pixels of what the effects did to these so far.
-    """
+    """The array in circuit units, as the effects leave their fixed pattern on it; arrays are (H, W) float64."""
 
     circuit: Circuit
     frame_rate_hz: float
-    gain: NDArray[np.float64]
-    dark_current_pA: NDArray[np.float64]
-    capacitance_fF: NDArray[np.float64]
-    swing_V: NDArray[np.float64]
+    gain: Floats
+    dark_current_pA: Floats
+    capacitance_fF: Floats
+    swing_V: Floats
     reset_noise_mV: float = 0.0
     quanta: float = 0.0
     dark_is_noisy: bool = True
     swing_spread_V: float = 0.0
+    """Standard deviation over pixels by the effects so far."""
     capacitance_spread_fF: float = 0.0
+    """As swing_spread_V."""
 
     @classmethod
     def nominal(cls, circuit: Circuit, frame_rate_hz: float, shape: tuple[int, int]) -> PixelArray:
@@ -119,9 +120,9 @@ class PixelArray:
         )
 
     def check(self) -> None:
-        """Raise InputError where what the effects do together leaves no sensor, whatever the pixels draw."""
+        """Raise InputError where the effects together leave no sensor, whatever the pixels draw."""
         swing_V, capacitance_fF = self.circuit.swing_V, self.circuit.capacitance_fF
-        for what, value, share, whole, unit, of in (
+        for name, value, share, whole, unit, of in (
             (_OF_SWINGS, self.swing_spread_V, MOST_SPREAD, swing_V, "V", "the swing"),
             (_OF_CAPACITANCES, self.capacitance_spread_fF, MOST_SPREAD, capacitance_fF, "fF", "circuit.capacitance_fF"),
             (_OF_RESETS, self.reset_noise_mV, MOST_KAPPA, 1e3 * swing_V, "mV", "the swing"),
@@ -129,23 +130,23 @@ class PixelArray:
             most = share * whole
             if value > most * (1.0 + 1e-9):
                 raise InputError(
-                    f"{what} is {value:g} {unit}; at most {most:g} {unit}, {share:g} of {of}; "
+                    f"{name} is {value:g} {unit}; at most {most:g} {unit}, {share:g} of {of}; "
                     "lower the one or raise the other"
                 )
 
-    def with_swings_off(self, sigma_V: float, normal: NDArray[np.float64]) -> PixelArray:
+    def with_swings_off(self, sigma_V: float, normal: Floats) -> PixelArray:
         """Swings off by sigma_V times normal numbers, (H, W) or broadcast to it; each keeps LEAST_SHARE of nominal."""
         swing = np.maximum(self.swing_V + sigma_V * normal, LEAST_SHARE * self.circuit.swing_V)
         return replace(self, swing_V=swing, swing_spread_V=math.hypot(self.swing_spread_V, sigma_V))
 
-    def with_capacitances_off(self, sigma_fF: float, normal: NDArray[np.float64]) -> PixelArray:
+    def with_capacitances_off(self, sigma_fF: float, normal: Floats) -> PixelArray:
         """Capacitances off by sigma_fF times normal numbers (H, W); each keeps LEAST_SHARE of nominal."""
         capacitance = np.maximum(self.capacitance_fF + sigma_fF * normal, LEAST_SHARE * self.circuit.capacitance_fF)
         spread = math.hypot(self.capacitance_spread_fF, sigma_fF)
         return replace(self, capacitance_fF=capacitance, capacitance_spread_fF=spread)
 
     def with_reset_noise(self, sigma_mV: float) -> PixelArray:
-        """Another noise of a reset besides what there is: variances add."""
+        """More noise of a reset: variances add."""
         return replace(self, reset_noise_mV=math.hypot(self.reset_noise_mV, sigma_mV))
 
 
@@ -157,36 +158,40 @@ UNIT_RANGES = {
     "swing_V": (1e-6, 1e3),
     "threshold_fC": (1e-9, 1e9),
 }
-"""Lowest and highest value of a pixel in a unit, in what `Unit` says.  Light is capped at two thresholds a frame, so
-gain and dark need only stay finite in single precision."""
+"""Lowest and highest value of a pixel in a unit.  Light is capped at two thresholds a frame, so gain and dark need only
+stay finite in single precision."""
 
 
 @dataclass(frozen=True)
 class Unit:
     """The firing law of every pixel; arrays are (H*W,) float64.
 
-    gain: thresholds a frame at radiance 1.  dark: thresholds a frame.  electrons: electrons to a threshold.
-    kappa: relative standard deviation of the threshold, drawn at each reset.  swing_V: voltage from reset to reference.
-    threshold_fC: charge of a threshold.
-    shot: whether charge is Poisson; dark_is_noisy: whether that holds for dark charge too.
-
-    >>> SensorModel.preset("ideal").draw_unit((1, 2), seed=0).gain.tolist()
-    [1.0, 1.0]
-    >>> bool(SensorModel.preset("scsim").draw_unit((1, 2), seed=0).shot)
-    True
+    Example:
+        >>> SensorModel.preset("ideal").draw_unit((1, 2), seed=0).gain.tolist()
+        [1.0, 1.0]
+        >>> bool(SensorModel.preset("scsim").draw_unit((1, 2), seed=0).shot)
+        True
     """
 
-    gain: NDArray[np.float64]
-    dark: NDArray[np.float64]
-    electrons: NDArray[np.float64]
-    kappa: NDArray[np.float64]
-    swing_V: NDArray[np.float64]
-    threshold_fC: NDArray[np.float64]
+    gain: Floats
+    """Thresholds a frame at radiance 1."""
+    dark: Floats
+    """Thresholds a frame."""
+    electrons: Floats
+    """Electrons to a threshold."""
+    kappa: Floats
+    """Relative standard deviation of the threshold, drawn at each reset."""
+    swing_V: Floats
+    """Voltage from reset to reference."""
+    threshold_fC: Floats
+    """Charge of a threshold."""
     shot: bool
+    """Whether charge is Poisson."""
     dark_is_noisy: bool
+    """Whether dark charge is Poisson too."""
 
     def owned(self) -> Unit:
-        """This unit, its arrays read-only; of arrays that somebody may change in place, copies."""
+        """This unit with read-only arrays, copied where somebody may change them in place."""
         arrays = {name: getattr(self, name) for name in UNIT_RANGES}
         copies: dict[str, Any] = {
             name: np.array(array, dtype=np.float64) for name, array in arrays.items() if not _is_own(array)
@@ -196,7 +201,7 @@ class Unit:
         return replace(self, **copies) if copies else self
 
     def limited(self) -> Unit:
-        """This unit, its electrons and kappa within UNIT_RANGES, as those of single pixels of a spread may not be."""
+        """This unit with electrons and kappa cut to UNIT_RANGES, which single pixels of a spread may exceed."""
         within: dict[str, Any] = {
             name: np.clip(getattr(self, name), *UNIT_RANGES[name]) for name in ("electrons", "kappa")
         }
@@ -204,19 +209,19 @@ class Unit:
 
     @cached_property
     def digest(self) -> str:
-        """Tells units apart: SHA-256 of all that they hold."""
+        """SHA-256 of all fields."""
         sha = hashlib.sha256()
         for f in fields(self):
             sha.update(np.ascontiguousarray(getattr(self, f.name)).tobytes())
         return sha.hexdigest()
 
     @property
-    def grains_per_frame(self) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+    def grains_per_frame(self) -> tuple[Pictures, Pictures]:
         """Gain and dark in the light law's unit, (P,) float32 each."""
         return (self.gain * GRAINS).astype(np.float32), (self.dark * GRAINS).astype(np.float32)
 
 
-def _is_own(array: NDArray[np.float64]) -> bool:
+def _is_own(array: Floats) -> bool:
     """Whether nobody can change an array: read-only, and no view of another."""
     return isinstance(array, np.ndarray) and not array.flags.writeable and array.base is None
 

@@ -1,13 +1,11 @@
-"""What the law tests share: streams of many like pixels, their intervals, and a test of a mean by groups."""
+"""Tools of the law tests: streams of many like pixels, their intervals, and a test of a mean by groups."""
 
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from spikecam_env.sensor import CATALOGUE, Effect, SensorModel, SpikeSensor
-
-Array = NDArray[np.float64]
+from spikecam_env.types import Floats
 
 
 def jittered(quanta: float = 0.0, kappa: float = 0.0) -> SensorModel:
@@ -21,8 +19,8 @@ def jittered(quanta: float = 0.0, kappa: float = 0.0) -> SensorModel:
 
 
 def spike_frames(
-    model: SensorModel, intervals: Array, count: int, engine: str, seed: int = 0, slack: float = 1.2
-) -> Array:
+    model: SensorModel, intervals: Floats, count: int, engine: str, seed: int = 0, slack: float = 1.2
+) -> Floats:
     """Frame numbers (P, count) of the first spikes of P pixels under steady light 1/intervals; skips the first two."""
     sensor = SpikeSensor(model, (1, intervals.size), seed, engine=engine)
     frames = int((count + 3) * intervals.max() * slack) + 2
@@ -35,7 +33,7 @@ def spike_frames(
     return out
 
 
-def check_mean(name: str, values: Array, expected: float, groups: int = 40, limit: float = 4.5) -> None:
+def check_mean(name: str, values: Floats, expected: float, groups: int = 40, limit: float = 4.5) -> None:
     """The mean of `values` (independent along axis 0) is `expected` within `limit` standard errors from groups."""
     means = np.array([g.mean() for g in np.array_split(values, groups)])
     error = means.std(ddof=1) / np.sqrt(groups)
@@ -59,13 +57,13 @@ def camera(
     return SpikeSensor(with_effects(base, CATALOGUE[name](**parameters)), shape, seed, engine)
 
 
-def rates(sensor: SpikeSensor, light: float | Array, frames: int) -> Array:
+def rates(sensor: SpikeSensor, light: float | Floats, frames: int) -> Floats:
     """Spikes a frame (H, W) under steady light, counted over `frames` frames."""
     picture = np.broadcast_to(np.float32(light), sensor.shape)
     return sensor.step(picture, frames).mean(axis=0)
 
 
-def population(sensor: SpikeSensor, light: float, frames: int) -> Array:
+def population(sensor: SpikeSensor, light: float, frames: int) -> Floats:
     """Share of the array that fires in each frame (frames,) under steady light, alike everywhere."""
     picture = np.full(sensor.shape, light, dtype=np.float32)
     shares = [sensor.step(picture, min(64, frames - n)).mean(axis=(1, 2)) for n in range(0, frames, 64)]

@@ -1,4 +1,4 @@
-"""`spikecam effects new`: what it writes is an effect and a test that pass as they stand; nothing is overwritten."""
+"""`spikecam effects new` writes an effect and a test that pass as they stand; nothing is overwritten."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ import pytest
 from spikecam_env.cli.main import run
 from spikecam_env.errors import InputError
 from spikecam_env.sensor import CATALOGUE, effects_from
-from spikecam_env.sensor.beginning import BEGUN, class_name, write_new_effect
+from spikecam_env.sensor.beginning import TEMPLATE, class_name, write_new_effect
 from spikecam_env.sensor.effects.base import effect_name
 
 
@@ -26,7 +26,7 @@ def test_what_is_written_passes_its_own_tests(tmp_path: Path, capsys) -> None:
     with effects_from(tmp_path / "mine" / "led_droop.py") as [effect]:
         assert effect.name == "led_droop" and effect.__name__ == "LedDroop"
     text = "".join(p.read_text(encoding="utf-8") for p in (tmp_path / "mine").glob("*.py"))
-    assert BEGUN not in text and class_name(BEGUN) not in text
+    assert TEMPLATE not in text and class_name(TEMPLATE) not in text
 
 
 def test_its_test_fails_where_the_law_does_not_do_what_it_says(tmp_path: Path) -> None:

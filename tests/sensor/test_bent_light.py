@@ -44,8 +44,8 @@ AT_BOUND = {
     "supply_ripple": ("ripple", 0.01 / 2.0, {"frequency_hz": 40e3}),
     "clock_feedthrough": ("amplitude_mV", -0.01 * 1092.4, {"tau_us": 1.0}),
 }
-"""The strength at which an effect is off by a hundredth in that strobe, and what else it needs, by the equations of
-`bent_light`: of ripple at the frame rate and of an edge that decays within a frame, the range is all that counts."""
+"""Strength at which an effect is off by a hundredth in that strobe, and other parameters, by the equations of
+`bent_light`.  Of ripple at the frame rate and of an edge that decays within a frame, only the range counts."""
 
 
 @pytest.mark.parametrize("name", sorted(AT_BOUND))
@@ -96,12 +96,7 @@ def test_an_effect_that_has_no_part_in_it_is_not_concerned() -> None:
         assert not bent.concerned(sensor._frame_effects, sensor._first_exposure()), name
 
 
-def test_another_word_is_refused() -> None:
-    with pytest.raises(InputError, match="bent_light"):
-        camera("dead_time", bent_light="maybe")
-
-
-def test_a_bend_is_what_small_steps_make_of_it() -> None:
+def test_a_bend_is_that_of_small_steps() -> None:
     """Against sums over 20 000 parts of the frame, of light by random keys."""
     rng = np.random.default_rng(3)
     times = np.sort(np.concatenate([[2.0, 4.0], 2.0 + 2.0 * rng.random(9)]))

@@ -5,15 +5,16 @@ from __future__ import annotations
 import inspect
 import zlib
 from itertools import pairwise
+from types import ModuleType
 
 import numpy as np
 import pytest
 from laws import jittered
 from numpy.typing import NDArray
 
-from spikecam_env.sensor import Keyframes, SensorModel, SpikeSensor
-from spikecam_env.sensor.kernels import every_frame, fast, loop
-from spikecam_env.sensor.kernels.stretches import stretches
+from spikecam_env.sensor import Keyframes, SensorModel, SpikeSensor, crossing, decay, random_fields
+from spikecam_env.sensor.compiled_tools import draws
+from spikecam_env.sensor.kernels import block_loop, every_frame, fast, loop
 from spikecam_env.sensor.light import Segment
 
 MODELS = {
@@ -96,13 +97,25 @@ def test_light_that_changes_often_is_served_frame_by_frame(interval: int, often:
 
     def served(count: int) -> bool:
         room = np.empty((count, 16), np.uint8)
-        (stretch,) = stretches(sensor._pixels.pixels, light, 0, sensor._imaging, room)
+        (stretch,) = fast.stretches(sensor._pixels.pixels, light, 0, sensor._imaging, room)
         return stretch.changes_often
 
     assert served(frames) == often
     assert not served(every_frame.AT_ONCE - 1)
 
 
-def test_the_kernel_names_the_loop_that_it_is_compiled_with() -> None:
-    now = zlib.crc32(inspect.getsource(loop).encode())
-    assert now == every_frame.LOOP, f"the loop has changed: write LOOP = {now:#x} in {every_frame.__file__}"
+@pytest.mark.parametrize(
+    "kernel, name, source",
+    [
+        (loop, "DRAWS", draws),
+        (random_fields, "DRAWS", draws),
+        (block_loop, "DRAWS", draws),
+        (block_loop, "DECAY", decay),
+        (block_loop, "CROSSING", crossing),
+        (every_frame, "LOOP", loop),
+    ],
+)
+def test_a_kernel_names_the_file_that_it_is_compiled_with(kernel: ModuleType, name: str, source: ModuleType) -> None:
+    """Numba's cache sees a change of the file it compiles, not of one that it imports from."""
+    now = zlib.crc32(inspect.getsource(source).encode())
+    assert now == getattr(kernel, name), f"{source.__name__} has changed: write {name} = {now:#x} in {kernel.__file__}"

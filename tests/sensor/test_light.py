@@ -11,7 +11,7 @@ from laws import check
 from spikecam_env.errors import InputError
 from spikecam_env.sensor import CATALOGUE, Keyframes, SensorModel, SpikeSensor, SpikeSensorBatch
 from spikecam_env.sensor.between_keys import frame_means, key_weights
-from spikecam_env.sensor.light import GRAINS, MAX_SEGMENT, ramp, segments
+from spikecam_env.sensor.light import GRAINS, ramp, segments
 
 SHAPE = (5, 7)
 GAIN, NO_DARK = np.full(1, GRAINS, np.float32), np.zeros(1, np.float32)
@@ -80,24 +80,11 @@ def test_dim_light_has_little_bias() -> None:
     assert abs(np.mean(biases)) < 1e-3
 
 
-def test_swinging_light_of_quarter_frame_keys_has_its_mean() -> None:
-    """0.2 (1 - cos 2 pi t), keys every quarter frame: 0.2 in every frame; it is 0.4 in the middle of each."""
-    t = np.arange(401) / 4
-    found = charges(uniform(t, 0.2 * (1 - np.cos(2 * np.pi * t))), 100) / GRAINS
-    assert np.abs(found - 0.2).max() < 2 / GRAINS
-
-
 @pytest.mark.parametrize("when", [100.0, 100.25, 100.75])
 def test_a_step_within_a_frame_counts_from_when_it_comes(when: float) -> None:
     light = Keyframes.steps([0.0, when], np.array([0.0, 0.4], np.float32).reshape(2, 1, 1))
     found = charges(light, 103) / (0.4 * GRAINS)
     np.testing.assert_allclose(found[99:], [0.0, 101.0 - when, 1.0, 1.0], atol=1e-6)
-
-
-def test_a_strobe_of_a_fifth_of_each_frame_brings_a_fifth_of_its_light() -> None:
-    edges = np.sort(np.concatenate([np.arange(100), np.arange(100) + 0.2]))
-    light = Keyframes.steps(edges, np.where(np.arange(200) % 2, 0.0, 2.5).reshape(-1, 1, 1))
-    assert np.abs(charges(light, 100) / GRAINS - 0.5).max() < 2 / GRAINS
 
 
 def test_steps_are_checked_as_keys_are() -> None:
@@ -108,16 +95,6 @@ def test_steps_are_checked_as_keys_are() -> None:
     ):
         with pytest.raises(InputError):
             Keyframes.steps(frame, radiance)
-
-
-def test_light_of_whole_keys_is_cut_at_keys_and_every_64_frames_from_them() -> None:
-    keys = uniform([3, 10, 150, 150 + 64, 300], [0.1, 0.5, 0.2, 0.9, 0.3])
-    found = [(s.length, s.first, s.count, float(s.radiance0[0])) for s in segments(keys, 0, 320)]
-    at = [keys.at(t)[0, 0] for t in (3, 10, 74, 138, 150, 214, 278)]
-    lengths = [7, 64, 64, 12, 64, 64, 22]
-    ramps = [(n, 0, n, pytest.approx(r)) for n, r in zip(lengths, at, strict=True)]
-    held = [(MAX_SEGMENT, 0, 3, pytest.approx(0.1))], [(MAX_SEGMENT, 0, 20, pytest.approx(0.3))]
-    assert found == [*held[0], *ramps, *held[1]]
 
 
 def test_light_that_rises_within_a_frame_is_never_negative() -> None:

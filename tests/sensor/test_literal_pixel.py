@@ -1,4 +1,4 @@
-"""The literal pixel against what is known in closed form, and a few of its rows against the engines."""
+"""The literal pixel against closed forms, and a few of its rows against the engines."""
 
 from __future__ import annotations
 
@@ -57,7 +57,7 @@ def test_a_literal_crosstalk_multiplies_the_rate() -> None:
 
 
 def test_a_literal_lag_delays_its_share() -> None:
-    """The frame of an edge at .6 gets .4 of the rise less what is late: (1 - f) + f (1 - tau/.4 (1 - exp(-.4/tau)))."""
+    """The frame of an edge at .6 gets .4 of the rise less the late share: 1 - f + f (1 - tau/.4 (1 - exp(-.4/tau)))."""
     tau, share = 1.5, 0.3
     film = square(0.1, 0.7, 40, 5.6)
     case = Case("", film, {"photodiode_lag": {"fraction": share, "tau_us": 25.0 * tau}}, (), groups=32, frames=200)

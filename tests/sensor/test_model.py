@@ -1,4 +1,4 @@
-"""Models: presets, TOML, effects in order, and one clear error for what is wrong."""
+"""Models: presets, TOML, effects in order, and one clear error for each fault."""
 
 from __future__ import annotations
 
@@ -45,15 +45,12 @@ def test_effects_stand_in_physical_order_whatever_the_order_given() -> None:
 def test_removing_one_effect_leaves_the_fixed_pattern_of_the_others(removed: str) -> None:
     whole = SensorModel.preset("scsim")
     names = ("conversion_gain_spread", "dark_current_spread", "capacitor_spread", "bias_voltage_spread")
+    of_name = {e.name: e for e in whole.effects}
     for kept in (n for n in names if n != removed):
-        alone = SensorModel("a", whole.circuit, whole.frame_rate_hz, tuple(e for e in whole.effects if e.name == kept))
-        with_removed = alone if removed == kept else alone.with_effect(_effect(whole, removed))
+        alone = SensorModel("a", whole.circuit, whole.frame_rate_hz, (of_name[kept],))
+        with_removed = alone.with_effect(of_name[removed])
         a, b = alone.draw_unit((8, 8), 3), with_removed.without(removed).draw_unit((8, 8), 3)
         np.testing.assert_array_equal(a.gain, b.gain)
-
-
-def _effect(model: SensorModel, name: str):
-    return next(e for e in model.effects if e.name == name)
 
 
 def test_what_is_wrong_is_named_with_what_is_allowed(tmp_path) -> None:

@@ -1,4 +1,4 @@
-"""What the sensor's numbers are for: each, halved or doubled, makes an error larger or an effort greater than said."""
+"""Purpose of the sensor's numbers: each, halved or doubled, makes an error larger or an effort greater than stated."""
 
 from __future__ import annotations
 
@@ -56,7 +56,7 @@ def test_a_frame_has_up_to_32_periods_of_a_ripple() -> None:
 
 @dataclass(frozen=True)
 class Lowered(Effect):
-    factor: float = parameter(0.6, unit="relative", bounds=(0.0, 1.0), doc="of the threshold, what is left")
+    factor: float = parameter(0.6, unit="relative", bounds=(0.0, 1.0), doc="share of the threshold that is left")
 
     stage = Stage.THRESHOLD
     strength = "factor"

@@ -62,6 +62,7 @@ def test_a_file_is_run_once_and_again_when_it_was_edited(file: Path, catalogue: 
         load_effects(other)
 
 
+LAST = "        return light.scaled(1.0 - self.loss), dark, memory\n"
 WRONG = {
     "no effect": ("class GreyFilter(Effect):", "class GreyFilter:", "has no effect"),
     "name in the catalogue": ("GreyFilter", "DeadTime", "there is an effect dead_time already .*dead_time"),
@@ -89,6 +90,13 @@ WRONG = {
     "share of nothing": ("needs=Needs.STEADY", 'share=("loss", "photons")', "unknown kind of share .*'photons'"),
     "step of zero": ("needs=Needs.STEADY", "shape_step=0.0", "shape_step = 0.0"),
     "unknown entry": ("needs=Needs.STEADY", "need=Needs.STEADY", "TypeError: .*need"),
+    "no hook": ("def collect", "def colect", "it has no hook, so that it does nothing; write one of imprint"),
+    "memory alone": ("def collect(self, light, dark, now, memory)", "def begin(self, light, dark, now)",
+                     "it has no hook, so that it does nothing"),
+    "sway alone": (LAST, f"{LAST}\n    def sway(self, now, phase, beside):\n        raise ValueError\n",
+                   "its hook sway does nothing without parts; write parts too"),
+    "parts alone": (LAST, f"{LAST}\n    def parts(self, rate):\n        raise ValueError\n",
+                    "its hook parts does nothing without sway; write sway too"),
     "syntax": ("    strength =", "    strength", "line 2[0-9]: SyntaxError"),
     "import": ("from dataclasses import dataclass", "import no_such_module", "line 10: ModuleNotFoundError"),
     "raises": ("@dataclass(frozen=True)", "1 / 0", "line 1[0-9]: ZeroDivisionError: division by zero"),
@@ -107,7 +115,7 @@ def test_what_is_wrong_in_a_file_is_said_in_a_line(old: str, new: str, said: str
     assert before == CATALOGUE
     assert run(["effects", "list", "--effect-file", str(file)]) == 2
     assert len(capsys.readouterr().err.splitlines()) == 1
-    if "line" in said:  # what failed in the middle is not kept
+    if "line" in said:  # a module that failed in the middle is not kept
         assert set(sys.modules) == modules
 
 
@@ -157,7 +165,7 @@ def test_another_process_loads_the_file_by_itself(file: Path, catalogue: None) -
     held = pickle.dumps(model)
     written(file, ("(0.05,", "(0.06,"))
     done = subprocess.run([sys.executable, "-c", code], input=held, capture_output=True)
-    assert "is not what it was when grey_filter was saved" in done.stderr.decode()
+    assert "has changed since grey_filter was saved" in done.stderr.decode()
 
 
 class _Package:

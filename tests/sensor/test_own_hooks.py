@@ -61,7 +61,7 @@ SWAYING = law("parts", "return 4")
 NOTHING = "    def begin(self, first, pattern, rng):\n        return None\n"
 
 WRONG = {
-    # compare: what it returns
+    # compare: its value
     "NaN": (law("compare", f"return Shift(factor={NAN_AT}), memory"), "compare, frame 3: factor is nan"),
     "infinite": (law("compare", "return Shift(millivolts=np.inf), memory"), "compare, frame.*: millivolts is inf"),
     "far too large": (law("compare", "return Shift(factor=1e300), memory"), "compare, .*factor is 1e\\+300"),
@@ -73,6 +73,10 @@ WRONG = {
     "complex number": (law("compare", "return Shift(factor=1j), memory"), "factor is 1j"),
     "objects": (law("compare", "return Shift(factor=np.full((1, 4, 1), None)), memory"), "factor is object"),
     "text": (law("compare", "return Shift(factor='1'), memory"), "compare, .*factor is '1'"),
+    "masked": (
+        law("compare", "return Shift(factor=np.ma.masked_equal(np.ones((now.frames, 1, 1)), 1.0)), memory"),
+        "compare, .*factor is an array with masked values",
+    ),
     "wrong rows": (law("compare", "return Shift(factor=np.ones((1, 5, 1))), memory"), r"shape \(1, 5, 1\)"),
     "wrong frames": (law("compare", "return Shift(factor=np.ones((now.frames + 1, 1, 1))), memory"), "has shape"),
     "no time axis": (law("compare", "return Shift(factor=np.ones(now.shape)), memory"), r"shape \(4, 6\)"),
@@ -80,10 +84,10 @@ WRONG = {
         law("compare", "return Shift(factor=np.broadcast_to(1.0, (1 << 20, 1 << 20, 64))), memory"),
         "factor has shape",
     ),
-    # what it does
+    # errors and exits
     "raises": (law("compare", "1 / 0"), r"compare, frame.*\(line \d+\): ZeroDivisionError: division by zero"),
     "raises text of many lines": (law("compare", "raise ValueError('a\\nb')"), "ValueError: a b"),
-    "raises what cannot be shown": (
+    "raises an error without text": (
         law("compare", "class E(Exception):", "    def __str__(self): return 1 / 0", "raise E"),
         "exception str\\(\\) failed",
     ),
@@ -110,7 +114,7 @@ WRONG = {
         law("imprint", "from dataclasses import replace", "return replace(pixels, swing_V=0 * pixels.swing_V)"),
         "imprint: swing_V is 0",
     ),
-    "imprint none": (law("imprint", "pass"), "imprint: what it returned is a NoneType"),
+    "imprint none": (law("imprint", "pass"), "imprint: the value is a NoneType"),
     "image": (law("image", "return radiance[:2]"), r"image: the picture has shape \(2, 6\)"),
     "image NaN": (law("image", "return radiance / 0 - radiance / 0"), "image: the picture is nan at"),
     "image negative": (law("image", "return -radiance"), "image: the picture is -0.5"),
@@ -145,7 +149,7 @@ WRONG = {
     "read_out in place": (law("read_out", "spikes[:] = True", "return spikes, memory"), "read_out.*read-only"),
     "feedback": (law("feedback", "return Feedback(kept=float('nan'))") + GOOD, "feedback, .*kept is nan"),
     "feedback time": (law("feedback", "return Feedback(left_tau=0.0)") + GOOD, "feedback, .*left_tau is 0"),
-    "feedback none": (law("feedback", "pass") + GOOD, "feedback, .*what it returned is a NoneType"),
+    "feedback none": (law("feedback", "pass") + GOOD, "feedback, .*the value is a NoneType"),
     "after_reset": (law("after_reset", "return residual * np.nan"), "after_reset, frame .*: the charge is nan"),
     "after_reset shape": (law("after_reset", "return 0.0"), "after_reset, .*the charge has shape"),
     "react": (law("react", "return threshold[0]"), "react, frame 0: the thresholds has shape|have shape"),
@@ -233,50 +237,27 @@ def test_parameters_are_held_to_their_ranges_where_an_effect_makes_itself(tmp_pa
             grey(loss=0.5)
 
 
-def test_an_effect_without_a_hook_is_refused(tmp_path: Path) -> None:
-    misspelt = own_file(tmp_path / "grey_filter.py", GOOD.replace("collect", "colect"))
-    said = "grey_filter: it has no hook, so that it does nothing; write one of imprint"
-    with pytest.raises(InputError, match=said), effects_from(misspelt):
-        pass
-
-
-@pytest.mark.parametrize(
-    ("hook", "partner"), [("sway(self, now, phase, beside)", "parts"), ("parts(self, rate)", "sway")]
-)
-def test_a_hook_that_is_never_called_is_refused_with_its_partner(hook: str, partner: str, tmp_path: Path) -> None:
-    alone = own_file(tmp_path / "grey_filter.py", f"{GOOD}\n    def {hook}:\n        raise ValueError\n")
-    said = f"its hook {hook.split('(')[0]} does nothing without {partner}; write {partner} too"
-    with pytest.raises(InputError, match=said), effects_from(alone):
-        pass
-
-
-def test_an_effect_that_only_remembers_is_refused(tmp_path: Path) -> None:
-    idle = own_file(tmp_path / "grey_filter.py", "    def begin(self, first, pattern, rng):\n        return 1\n")
-    with pytest.raises(InputError, match="it has no hook, so that it does nothing"), effects_from(idle):
-        pass
-
-
-def test_masked_values_of_a_hook_are_refused(tmp_path: Path) -> None:
-    hooks = law("compare", "return Shift(factor=np.ma.masked_equal(np.ones((now.frames, 1, 1)), 1.0)), memory")
-    with effects_from(own_file(tmp_path / "grey_filter.py", hooks)) as [grey]:
-        sensor = SpikeSensor(SensorModel.preset("ideal").with_effect(grey()), SHAPE)
-        with pytest.raises(OwnCodeError, match=r"compare, .*factor is an array with masked values"):
-            sensor.step(np.full(SHAPE, 0.5), FRAMES)
+DRAW_NOTHING = ("supply_ripple", "optical_blur", "vignetting", "photodiode_lag", "blooming", "readout_skew",
+                "dead_time", "comparator_delay", "synchronous_reset", "incomplete_reset", "crosstalk", "ir_drop",
+                "light_flicker", "clock_feedthrough", "photo_response_nonlinearity", "dark_current_drift")  # fmt: skip
 
 
 @pytest.mark.parametrize("base", ["ideal", "scsim"])
-@pytest.mark.parametrize("engine", ["reference", "fast"])
+@pytest.mark.parametrize("engine", ["reference", "auto"])
 def test_a_checked_law_gives_the_bits_of_the_same_law_unchecked(base: str, engine: str, tmp_path: Path) -> None:
-    """A shipped effect as a user's own, under another name: what the check hands on is what the law returned."""
+    """Every shipped effect as a user's own, under another name: it changes no array in place, and keeps shapes.
+
+    The check hands on the values of the law; of effects that draw, another name draws other numbers.
+    """
     light = np.random.default_rng(0).uniform(0.0, 1.5, SHAPE)
-    for name in ("supply_ripple", "optical_blur", "vignetting", "photodiode_lag", "blooming", "readout_skew"):
-        shipped = CATALOGUE[name]
+    for name, shipped in CATALOGUE.items():
         text = Path(inspect.getsourcefile(shipped)).read_text(encoding="utf-8")
         file = tmp_path / f"own_{name}.py"
         file.write_text(text.replace(f"class {shipped.__name__}", f"class {shipped.__name__}s"), encoding="utf-8")
         with effects_from(file) as [own]:
             spikes = [_spikes(SensorModel.preset(base).with_effect(e()), light, engine) for e in (shipped, own)]
-        np.testing.assert_array_equal(*spikes, err_msg=name)
+        if name in DRAW_NOTHING:
+            np.testing.assert_array_equal(*spikes, err_msg=name)
 
 
 def _spikes(model: SensorModel, light: np.ndarray, engine: str) -> np.ndarray:

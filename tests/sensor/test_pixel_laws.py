@@ -1,4 +1,4 @@
-"""The laws of the pixel (DESIGN section 2), on both engines, each against its closed form."""
+"""The laws of the pixel, on both engines, each against its closed form."""
 
 from __future__ import annotations
 

@@ -39,14 +39,6 @@ def test_cutting_the_stream_changes_no_bit(engine: str, light) -> None:
 
 
 @pytest.mark.parametrize("engine", ENGINES)
-def test_keys_between_frames_are_served_and_cut_alike(engine: str) -> None:
-    light = Keyframes(np.array([0.0, 10.25, 33.5]), moving_light().radiance[:3])
-    whole = SpikeSensor("scsim", SHAPE, 1, engine=engine).step(light, 50)
-    cut = stream(SpikeSensor("scsim", SHAPE, 1, engine=engine), light, [3, 30, 17])
-    np.testing.assert_array_equal(cut, whole)
-
-
-@pytest.mark.parametrize("engine", ENGINES)
 def test_save_and_restore_mid_stream_changes_nothing(engine: str) -> None:
     light = moving_light()
     sensor = SpikeSensor("scsim", SHAPE, 1, engine=engine)
@@ -103,8 +95,6 @@ def test_auto_takes_the_fast_engine_where_it_carries_the_model() -> None:
     assert SpikeSensor("scsim", SHAPE, engine="auto").engine == "fast"
     lossy = SensorModel.preset("scsim").with_effect(CATALOGUE["dead_time"]())
     assert SpikeSensor(lossy, SHAPE, engine="auto").engine == "fast"
-    with pytest.raises(InputError, match="cuda engine does not carry dead_time"):
-        SpikeSensor(lossy, SHAPE, engine="cuda")
     with pytest.raises(InputError, match="dark_is_noisy"):
         SpikeSensor(
             SensorModel.preset("ideal").with_effect(CATALOGUE["shot_noise"](dark_is_noisy=False)), SHAPE, engine="fast"
@@ -129,17 +119,16 @@ def test_bad_light_is_named_and_steps_nothing(radiance, message: str) -> None:
 
 
 def test_bad_arguments_are_named() -> None:
-    good = np.ones(SHAPE, np.float32)
-    for frames in (0, -1, 1.5):
-        with pytest.raises(InputError, match="frames"):
-            SpikeSensor("scsim", SHAPE).step(good, frames)
-    for shape in ((0, 4), (4,), (2.5, 3), "ab"):
+    for shape in ((4,), "ab"):
         with pytest.raises(InputError, match="shape"):
             SpikeSensor("scsim", shape)
-    with pytest.raises(InputError, match="seed"):
-        SpikeSensor("scsim", SHAPE, seed=-1)
-    with pytest.raises(InputError, match="unknown engine 'gpu'; choose one of"):
-        SpikeSensor("scsim", SHAPE, engine="gpu")
+    for message, argument in (
+        ("seed", {"seed": -1}),
+        ("unknown engine 'gpu'; choose one of", {"engine": "gpu"}),
+        ("bent_light", {"bent_light": "maybe"}),
+    ):
+        with pytest.raises(InputError, match=message):
+            SpikeSensor("scsim", SHAPE, **argument)
     with pytest.raises(InputError, match="reference sensor"):
         SpikeSensor("scsim", SHAPE).restore(SpikeSensor("scsim", SHAPE, engine="reference").state())
     for frame, radiance in (([1, 0], np.ones((2, 2, 2))), ([0], np.ones((2, 2))), ([0, np.nan], np.ones((2, 2, 2)))):
@@ -249,19 +238,6 @@ def test_ramps_that_stand_still_are_light_that_stays(name: str) -> None:
     whole = SpikeSensor(model, SHAPE, 1, "reference").step(light, 120)
     for cuts in ([120], [1] * 90 + [30], [7] * 15 + [15]):
         np.testing.assert_array_equal(stream(SpikeSensor(model, SHAPE, 1), light, cuts), whole)
-
-
-def test_optics_act_once_a_key_and_not_once_a_step(monkeypatch) -> None:
-    blur, calls = CATALOGUE["optical_blur"], []
-    image = blur.image
-    monkeypatch.setattr(blur, "image", lambda self, picture: (calls.append(1), image(self, picture))[1])
-    sensor = SpikeSensor(SCSIM.with_effect(blur(sigma_pixels=1.0)), SHAPE, 1)
-    for _ in range(64):
-        sensor.step(moving_light(16))
-    assert len(calls) == 64 // 16 + 1
-    for _ in range(9):
-        sensor.step(np.full(SHAPE, 0.3, np.float32))
-    assert len(calls) == 64 // 16 + 2
 
 
 @pytest.mark.parametrize("engine", ENGINES)
@@ -381,7 +357,7 @@ def test_units_that_are_no_law_are_refused(name: str) -> None:
         SpikeSensor("scsim", SHAPE, unit=replace(unit, shot="no"))
 
 
-@pytest.mark.parametrize("bad", [True, -1, 1.0, "4", None, 10**5000], ids=lambda bad: type(bad).__name__)
+@pytest.mark.parametrize("bad", [True, 0, -1, 1.0, 1.5, "4", None, 10**5000], ids=lambda bad: type(bad).__name__)
 def test_counts_and_shapes_are_whole_numbers_that_fit(bad) -> None:
     for call in (
         lambda: SpikeSensor("ideal", SHAPE).step(PLAIN, bad),

@@ -14,12 +14,12 @@ from spikecam_env.sensor.declaration import NAME
 from spikecam_env.sensor.effects import CATALOGUE, base
 from spikecam_env.whole import whole_folder, write_text_whole
 
-BEGUN = "new_effect"
-"""The effect of this folder: files, class and text bear its name."""
+TEMPLATE = "new_effect"
+"""Name of the effect of this folder, in files, class and text."""
 
 
 def check_new_name(name: str) -> None:
-    """Raises InputError for a name that is no effect's, is in the catalogue, or would make a class of another name."""
+    """Raise InputError for a name that is no effect's, is in the catalogue, or would make a class of another name."""
     file_name(name, "effect name")
     if not NAME.fullmatch(name):
         raise InputError(f"effect name {shown(name)}: give lower-case words with underscores between, as threshold_sag")
@@ -44,7 +44,7 @@ def write_new_effect(name: str, folder: Path, *, force: bool = False) -> tuple[P
         Paths of the effect and of its test.
 
     Raises:
-        InputError: as `check_new_name` does, for files that are there already, and where they cannot be written.
+        InputError: as `check_new_name` does, and for files that exist or cannot be written.
     """
     check_new_name(name)
     effect, test = folder / f"{name}.py", folder / f"test_{name}.py"
@@ -52,16 +52,16 @@ def write_new_effect(name: str, folder: Path, *, force: bool = False) -> tuple[P
         for path in (effect, test):
             if path.exists() and not force:
                 raise InputError(f"{path} is there already; give another name, or --force to replace it")
-        write_text_whole(beside / effect.name, _renamed(f"{BEGUN}.py", name))
-        write_text_whole(beside / test.name, _renamed(f"test_{BEGUN}.py", name))
+        write_text_whole(beside / effect.name, _renamed(f"{TEMPLATE}.py", name))
+        write_text_whole(beside / test.name, _renamed(f"test_{TEMPLATE}.py", name))
     return effect, test
 
 
 def class_name(name: str) -> str:
-    """Of an effect's class: that of threshold_sag is ThresholdSag."""
+    """Name of an effect's class: ThresholdSag for threshold_sag."""
     return "".join(word.capitalize() for word in name.split("_"))
 
 
 def _renamed(file: str, name: str) -> str:
     text = (resources.files(__package__) / file).read_text(encoding="utf-8")
-    return text.replace(class_name(BEGUN), class_name(name)).replace(BEGUN, name)
+    return text.replace(class_name(TEMPLATE), class_name(name)).replace(TEMPLATE, name)

@@ -29,7 +29,7 @@ def test_strength_zero_changes_no_bit(base: str) -> None:
 
 
 def test_engines_give_the_same_bits_without_noise() -> None:
-    """The reference, and the engine that is chosen for it: where that is the reference too, this asks nothing."""
+    """The reference, and the engine that is chosen for it: where that is the reference too, this tests nothing."""
     model = SensorModel.preset("ideal").with_effect(NewEffect())
     np.testing.assert_array_equal(spikes_of(model), spikes_of(model, "reference"))
 
@@ -42,7 +42,7 @@ def test_a_stream_is_the_same_however_it_is_cut() -> None:
 
 
 def test_limiting_case() -> None:
-    """Yours to fill in: what follows from the law where it can be worked out.  Half of the light, half of the rate."""
+    """Yours to fill in: a consequence of the law in closed form.  Half of the light, half of the rate."""
     radiance, frames = 0.2, 2000
     model = SensorModel.preset("ideal").with_effect(NewEffect(loss=0.5))
     rate = SpikeSensor(model, SHAPE, engine="auto").step(np.full(SHAPE, radiance), frames).mean()

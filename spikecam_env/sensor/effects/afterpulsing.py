@@ -22,9 +22,10 @@ from spikecam_env.types import Masks
 
 
 class Pending(NamedTuple):
-    """due: what is still to report again, as frame * pixels + pixel (n,), in order.  rng: what draws them."""
+    """Spikes still to be reported again."""
 
     due: NDArray[np.int64]
+    """As frame * pixels + pixel (n,), in order."""
     rng: np.random.Generator
 
 

@@ -1,14 +1,14 @@
-"""What an effect is: a named deviation from the ideal pixel, with parameters, applied in physical order.
+"""An effect: a named deviation from the ideal pixel, with parameters, applied in physical order.
 
 An effect is a frozen dataclass in a file of its own; it overrides the hooks that it needs and no others.
 Once a camera:
 
     imprint      the fixed pattern, on the array in circuit units
-    image        what optics do to a picture: linear, and the same at all times
+    image        the image that optics make of a picture: linear, and the same at all times
 
 once a recording:
 
-    begin        what the effect remembers from frame to frame; by default a random generator of its own
+    begin        memory of the effect from frame to frame; by default a random generator of its own
 
 for a block of frames, whatever fires in it; arrays have a leading axis of time:
 
@@ -17,17 +17,17 @@ for a block of frames, whatever fires in it; arrays have a leading axis of time:
     sway         how it moves within them; `parts` and `kinks` say how finely
     read_out     bits reported
 
-and frame by frame, for what depends on the spikes:
+and frame by frame, for laws that depend on the spikes:
 
-    react        thresholds of a frame, given what fired before it
+    react        thresholds of a frame, given the spikes before it
     after_reset  charge left on the pixels that fired
-    spiked       charge of all pixels, when it is known which fired
-    feedback     the same three in numbers that the compiled kernel reads
+    spiked       charge of all pixels at the end of a frame, given its spikes
+    feedback     the same three in numbers, for the compiled kernel
 
 Of one hook the effects act by stage (optics, photodiode, integration, threshold, reset, read-out) and, within a stage,
-by name.  Hooks are functions of their arguments: they change no array in place, and return the memory for what follows.
-How a recording is cut into blocks must change no bit: draw frame by frame, arrays of (F, ...) in the order of time.
-Every strength has a neutral value at which each hook returns exactly what it was given, so that no bit changes.
+by name.  Hooks are functions of their arguments: they change no array in place, and return the memory for later
+frames.  Cuts of a recording into blocks must change no bit: draw frame by frame, arrays of (F, ...) in order of time.
+Every strength has a neutral value at which each hook returns its arguments unchanged, so that no bit changes.
 
 The reference calls every hook, a block of one frame at a time.  The fast engine calls those for blocks and takes the
 rest from `feedback`; an effect that reacts to spikes and does not declare it, it refuses by name.  An effect with
@@ -38,7 +38,7 @@ from __future__ import annotations
 
 import dataclasses
 import re
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from enum import Enum, IntEnum
 from typing import Any, ClassVar, NamedTuple
 
@@ -55,7 +55,10 @@ from spikecam_env.sensor.unit import PixelArray, Unit
 from spikecam_env.types import Floats, Masks, Pictures
 
 PACKAGE = f"{__package__}."
-"""Modules of the package's own effects begin with it; hooks of others are checked (`sensor/own_hooks.py`)."""
+"""Prefix of the package's own effects; hooks of others are checked (`sensor/own_hooks.py`)."""
+
+NEW_CLASS_CHECKS: list[Callable[[type[Effect]], None]] = []
+"""Called with each new class of another package, when the class is made."""
 
 MOST_PARTS = 1024
 """Parts of a frame at most: 32 periods of a sine."""
@@ -67,8 +70,9 @@ PARTS_OF_A_CYCLE = 32
 class Stage(IntEnum):
     """Where in the pixel an effect acts; the order is the order of application.
 
-    >>> [stage.name for stage in Stage][:3]
-    ['OPTICS', 'PHOTODIODE', 'INTEGRATION']
+    Example:
+        >>> [stage.name for stage in Stage][:3]
+        ['OPTICS', 'PHOTODIODE', 'INTEGRATION']
     """
 
     OPTICS = 1
@@ -82,9 +86,10 @@ class Stage(IntEnum):
 class Acts(Enum):
     """How an effect acts within a frame; its docstring says so in these words, and how far that is exact.
 
-    >>> from spikecam_env.sensor import CATALOGUE
-    >>> CATALOGUE["dead_time"].acts
-    <Acts.CROSSING: 'at the crossing'>
+    Example:
+        >>> from spikecam_env.sensor import CATALOGUE
+        >>> CATALOGUE["dead_time"].acts
+        <Acts.CROSSING: 'at the crossing'>
     """
 
     CONSTANT = "constant in time"
@@ -96,27 +101,31 @@ class Acts(Enum):
 
 @dataclasses.dataclass(frozen=True)
 class ExposureBlock:
-    """A block of frames of one camera: what a hook may know.
+    """A block of frames of one camera: the circumstances of a hook's call.
 
-    number: of its first frame, absolute, from 0.  shape: (rows, columns).  unit: the firing law of every pixel.
-    frames: how many, F; one for the hooks that act frame by frame.
-    length: of a frame, in the camera's; below 1 where light bends and an effect that `wants_rise` is asked for pieces:
-    the block is then one piece, `number` 0, `frame_rate_hz` one over its length, and it begins `origin` such lengths
-    after the recording does.
+    Where light bends within a frame, an effect that `wants_rise` gets it piece by piece: a block is then one piece, of
+    number 0, with the frame rate of frames as short as it.
 
-    >>> from spikecam_env.sensor import SensorModel
-    >>> unit = SensorModel.preset("ideal").draw_unit((2, 2), seed=0)
-    >>> ExposureBlock(number=40, frame_rate_hz=40_000.0, shape=(2, 2), unit=unit, frames=2).start.ravel().tolist()
-    [40.0, 41.0]
+    Example:
+        >>> from spikecam_env.sensor import SensorModel
+        >>> unit = SensorModel.preset("ideal").draw_unit((2, 2), seed=0)
+        >>> ExposureBlock(number=40, frame_rate_hz=40_000.0, shape=(2, 2), unit=unit, frames=2).start.ravel().tolist()
+        [40.0, 41.0]
     """
 
     number: int
+    """Of its first frame, absolute, from 0."""
     frame_rate_hz: float
     shape: tuple[int, int]
+    """(rows, columns)."""
     unit: Unit
+    """The firing law of every pixel."""
     frames: int = 1
+    """How many, F; one for the hooks that act frame by frame."""
     length: float = 1.0
+    """Of a frame, in the camera's frames; of a piece, below 1."""
     origin: float = 0.0
+    """Time from the recording's start to a piece, in lengths of the piece."""
 
     @property
     def start(self) -> Floats:
@@ -139,38 +148,42 @@ class ExposureBlock:
 
 
 class Few(NamedTuple):
-    """Charge of a few pixels: flat indices (n,), ascending, and what each gets in every frame (F, n) [thresholds].
+    """Charge of a few pixels.
 
-    >>> hot = Few(np.array([1]), np.array([[0.5]]))
-    >>> Charge(np.zeros((1, 1, 3))).plus(hot).values.tolist()
-    [[[0.0, 0.5, 0.0]]]
+    Example:
+        >>> hot = Few(np.array([1]), np.array([[0.5]]))
+        >>> Charge(np.zeros((1, 1, 3))).plus(hot).values.tolist()
+        [[[0.0, 0.5, 0.0]]]
     """
 
     pixels: NDArray[np.intp]
+    """Flat indices (n,), ascending."""
     charge: Floats
+    """Of each in every frame (F, n) [thresholds]."""
 
 
 @dataclasses.dataclass(frozen=True)
 class Charge:
     """Charge expected of every pixel in every frame of a block [thresholds]: pixels * factor, below zero as zero.
 
-    pixels: (F, H, W), or (1, H, W) where all frames are alike.  factor: (F, 1, 1), (F, H, 1) or a number.
-    few: what some of the pixels get besides, before the factor.
-    Three parts, so that what is common to all pixels, or is in few, costs a number a frame and not a picture.
-    rise: as pixels, or 0: by how much more of it comes at a frame's end than at its start, a frame; of charge that is
-    not linear in the frame, of the line with its mean and first moment.  An effect that changes charge otherwise than
-    by a factor may leave it out.
-    tilt: (F, 1, 1) or 0: what rises besides, pixels * tilt.
+    Its parts keep a number a frame for changes common to all pixels, and no picture for charge of a few.
 
-    >>> Charge(np.array([[[0.2, 0.4]]])).scaled(0.5).values.tolist()
-    [[[0.1, 0.2]]]
+    Example:
+        >>> Charge(np.array([[[0.2, 0.4]]])).scaled(0.5).values.tolist()
+        [[[0.1, 0.2]]]
     """
 
     pixels: Floats
+    """(F, H, W), or (1, H, W) where all frames are alike."""
     factor: Floats | float = 1.0
+    """(F, 1, 1), (F, H, 1) or a number."""
     rise: Floats | float = 0.0
+    """As pixels, or 0: charge at a frame's end minus that at its start, per frame, of the line with its mean and first
+    moment.  An effect that changes charge otherwise than by a factor may leave it out."""
     few: Few | None = None
+    """More charge of some pixels, before the factor."""
     tilt: Floats | float = 0.0
+    """(F, 1, 1) or 0: more rise, pixels * tilt."""
 
     def scaled(self, factor: Floats | float) -> Charge:
         """This, times a number a frame or a row."""
@@ -185,7 +198,7 @@ class Charge:
         return Charge(x * by.mean + rises * (by.tilt / 12.0), 1.0, x * by.tilt + rises * by.square)
 
     def plus(self, few: Few) -> Charge:
-        """This, and what a few pixels get besides."""
+        """This, and more charge of a few pixels."""
         if self._whole and self.few is None:
             return Charge(self.pixels, 1.0, self.rise, few)
         return Charge(self.values, 1.0, self.rises, few)
@@ -218,33 +231,35 @@ class Charge:
 class Shift:
     """How the comparators' reference moves: a pixel fires at its threshold * factor + millivolts over its swing.
 
-    From frame to frame (`compare`): factor: (F, H, 1), with 1 for F or H where all are alike.  millivolts: (F, H, W),
-    with 1 for F, H or W; a field that differs from pixel to pixel is taken in single precision.
-    Within frames (`sway`): either (F, H, n), with 1 for F or H, at the n moments asked for.
-    Either may be a number.  Of several effects the factors multiply and the millivolts add.
+    Within frames (`sway`) both are (F, H, n), with 1 for F or H, at the n given moments.  Either may be a number.
+    Of several effects the factors multiply and the millivolts add.
 
-    >>> Shift(millivolts=2.0)
-    Shift(factor=1.0, millivolts=2.0)
+    Example:
+        >>> Shift(millivolts=2.0)
+        Shift(factor=1.0, millivolts=2.0)
     """
 
     factor: Floats | float = 1.0
+    """From frame to frame (`compare`): (F, H, 1), with 1 for F or H where all are alike."""
     millivolts: Floats | Pictures | float = 0.0
+    """From frame to frame: (F, H, W), with 1 for F, H or W; in single precision where pixels differ."""
 
 
 class Feedback(NamedTuple):
-    """What spikes do to the pixels, in numbers; charge in thresholds, time in frames.
+    """Actions of spikes on the pixels, in numbers; charge in thresholds, time in frames.
 
     On a reset, x being the charge of the frame:
 
         residual <- (residual - lost_per_root_rate sqrt(x) - lost_per_rate x) kept
 
     At the moment of a spike each of its four neighbours gets `kick_at_once`, and fires where that is enough, but not
-    twice at one moment: what would make it is lost.  At the end of the frame every pixel gets `kick` for each of its
-    four neighbours that fired, and one that fired gets left (1 - exp(-T/left_tau)), T the interval that has ended.
-    Thresholds of a row are times 1 + droop a, a the share of it that fired in the frame before.
+    twice at one moment: a kick that would make it fire again is lost.  At the end of the frame every pixel gets `kick`
+    for each of its four neighbours that fired.  One that fired gets left (1 - exp(-T/left_tau)), T the interval that
+    has ended.  Thresholds of a row are times 1 + droop a, a the share of it that fired in the frame before.
 
-    >>> Feedback(lost_per_rate=0.1).lost(np.array([0.0, 0.5])).tolist()
-    [0.0, 0.05]
+    Example:
+        >>> Feedback(lost_per_rate=0.1).lost(np.array([0.0, 0.5])).tolist()
+        [0.0, 0.05]
     """
 
     lost_per_root_rate: float = 0.0
@@ -264,51 +279,53 @@ class Feedback(NamedTuple):
 class Bend(NamedTuple):
     """How the charge of a frame with keys inside it comes, every pixel's (H, W) [thresholds], dark current included.
 
-    mean: charge of the frame.  uneven: the largest distance of the light at any moment from it [thresholds a frame].
-    moved: charge that comes at another time than if it came evenly.  bent: the largest distance of the light from the
-    straight line with its mean and first moment [thresholds a frame]; off_line: the integral of that distance.
-
-    >>> even = Bend(np.full((2, 2), 0.2), *np.zeros((4, 2, 2)))
-    >>> float(even.mean.max()), float(even.uneven.max())
-    (0.2, 0.0)
+    Example:
+        >>> even = Bend(np.full((2, 2), 0.2), *np.zeros((4, 2, 2)))
+        >>> float(even.mean.max()), float(even.uneven.max())
+        (0.2, 0.0)
     """
 
     mean: Floats
+    """Charge of the frame."""
     uneven: Floats
+    """Largest distance of the light at any moment from the mean [thresholds a frame]."""
     moved: Floats
+    """Charge that comes at another time than if it came evenly."""
     bent: Floats
+    """Largest distance of the light from the straight line with its mean and first moment [thresholds a frame]."""
     off_line: Floats
+    """Integral of that distance."""
 
 
 @dataclasses.dataclass(frozen=True)
 class Effect:
     """Base of all effects; every hook here does nothing.  Charge is in thresholds of each pixel.
 
-    strength: the parameter that says how strong the effect is.  neutral: its value at which no bit changes.
-
-    >>> from spikecam_env.sensor import CATALOGUE
-    >>> effect = CATALOGUE["dead_time"](tau_us=0.2)
-    >>> effect.stage.name, effect.parameters(), effect.neutralised()
-    ('RESET', {'tau_us': 0.2}, DeadTime(tau_us=0.0))
+    Example:
+        >>> from spikecam_env.sensor import CATALOGUE
+        >>> effect = CATALOGUE["dead_time"](tau_us=0.2)
+        >>> effect.stage.name, effect.parameters(), effect.neutralised()
+        ('RESET', {'tau_us': 0.2}, DeadTime(tau_us=0.0))
     """
 
     stage: ClassVar[Stage]
     acts: ClassVar[Acts | None] = None
     wants_rise: ClassVar[bool] = False
-    """Whether `collect` asks for the rise of light within a frame, and, but for effects of the read-out, is given light
-    that bends within one piece by piece: its charge then is that of a frame as bright as the piece."""
+    """Whether `collect` needs the rise of light within a frame.  Effects before the read-out then get light that bends
+    piece by piece, as charge of a frame as bright as the piece."""
     name: ClassVar[str] = "effect"
     strength: ClassVar[str]
+    """The parameter that is the strength of the effect."""
     neutral: ClassVar[float] = 0.0
+    """The strength at which no bit changes."""
     identification: ClassVar[Identification] = Identification()
     """How a diagnosis finds it in recordings."""
 
     def __init_subclass__(cls) -> None:
         cls.name = effect_name(cls.__name__)
         if not cls.__module__.startswith(PACKAGE):
-            from spikecam_env.sensor.own_hooks import guard  # it knows all that hooks return, which is defined here
-
-            guard(cls)
+            for check in NEW_CLASS_CHECKS:
+                check(cls)
 
     def __post_init__(self) -> None:
         check_parameters(self, self.name)
@@ -341,15 +358,17 @@ class Effect:
         """Leave the fixed pattern (and constant strengths) on the array."""
         return pixels
 
-    def image(self, radiance: NDArray[np.float32]) -> NDArray[np.float32]:
+    def image(self, radiance: Pictures) -> Pictures:
         """The picture (H, W) that reaches the pixels; linear in `radiance`."""
         return radiance
 
     def begin(self, first: ExposureBlock, pattern: np.random.Generator, rng: np.random.Generator) -> Any:
-        """What the effect remembers at frame 0; picklable.
+        """Memory of the effect at frame 0; picklable.
 
-        pattern: for what belongs to the unit, the same in all its recordings.  rng: for this recording.  Both are this
-        effect's alone.
+        Args:
+            first: the first frame.
+            pattern: generator of this effect for properties of the unit, the same in all its recordings.
+            rng: generator of this effect for this recording.
         """
         return rng
 
@@ -362,8 +381,7 @@ class Effect:
         return Shift(), memory
 
     def parts(self, frame_rate_hz: float) -> int:
-        """Parts of a frame in each of which the reference moves by `sway` as if linearly, at most MOST_PARTS; 0
-        where it does not move within a frame."""
+        """Parts of a frame in each of which the reference moves linearly by `sway`, MOST_PARTS at most; 0 for none."""
         return 0
 
     def kinks(self, first: ExposureBlock) -> tuple[float, ...]:
@@ -373,19 +391,21 @@ class Effect:
     def sway(self, now: ExposureBlock, phase: Floats, beside: Floats) -> Shift:
         """How the reference moves within these frames, at moments (H or 1, n) of each.
 
-        phase: of the array's clock at those moments [frames]: 0 at the start of the frame, below 0 in the rows that
-        are read before its end.  beside: a phase near it between the same two kinks: where the reference jumps there
-        are two moments, before and after, of the same phase, on either side of the jump.
+        Args:
+            now: the frames.
+            phase: of the array's clock at those moments [frames]: 0 at the start of the frame, below 0 in the rows
+                that are read before its end.
+            beside: a phase near it between the same two kinks.  A jump of the reference has two moments of the same
+                phase, one on either side.
         """
         return Shift()
 
     def lead(self, first: ExposureBlock) -> Floats | float:
-        """How long before the end of the array's frame each row is read (H, 1) [frames]."""
+        """Time from each row's read-out to the end of the array's frame (H, 1) [frames]."""
         return 0.0
 
     def off_the_line(self, bend: Bend, now: ExposureBlock) -> Floats | float:
-        """How far `collect` may be off in a frame whose light bends (H, W) [thresholds]; `bent_light` adds what
-        `sway` and `feedback` say."""
+        """Largest error of `collect` in a frame whose light bends (H, W) [thresholds], beside `sway` and `feedback`."""
         return 0.0
 
     def read_out(self, spikes: Masks, now: ExposureBlock, memory: Any) -> tuple[Masks, Any]:
@@ -393,21 +413,21 @@ class Effect:
         return spikes, memory
 
     def react(self, threshold: Floats, now: ExposureBlock, memory: Any) -> Floats:
-        """What the comparators compare with in this frame (H, W), given what the effect remembers of spikes."""
+        """Thresholds of this frame (H, W), given the memory of spikes."""
         return threshold
 
     def after_reset(self, residual: Floats, rate: Floats, now: ExposureBlock) -> Floats:
-        """Charge left on the pixels that fired (n,), given what is over their threshold and their charge a frame."""
+        """Charge left on the pixels that fired (n,), given that over their threshold and their charge a frame."""
         return residual
 
     def spiked(
         self, charge: Floats, spikes: Masks, rate: Floats, now: ExposureBlock, memory: Any
     ) -> tuple[Floats, Any]:
-        """Charge at the end of the frame (H, W), given who fired in it and the charge a frame, and the memory."""
+        """Charge at the end of the frame (H, W), given its spikes and the charge a frame, and the memory."""
         return charge, memory
 
     def feedback(self, first: ExposureBlock) -> Feedback:
-        """What `react`, `after_reset` and `spiked` do."""
+        """The numbers of `react`, `after_reset` and `spiked`."""
         return Feedback()
 
 
@@ -417,10 +437,11 @@ FRAME_HOOKS = ("begin", *BLOCK_HOOKS, *SPIKE_HOOKS)
 
 
 def effect_name(class_name: str) -> str:
-    """The name of an effect by that of its class: DeadTime is dead_time.
+    """The name of an effect by that of its class.
 
-    >>> effect_name("DeadTime")
-    'dead_time'
+    Example:
+        >>> effect_name("DeadTime")
+        'dead_time'
     """
     return re.sub(r"(?<=[a-z0-9])(?=[A-Z])", "_", class_name).lower()
 
@@ -428,18 +449,20 @@ def effect_name(class_name: str) -> str:
 def having(hook: str, effects: Sequence[Effect]) -> list[Effect]:
     """The effects with a hook of their own of that name.
 
-    >>> from spikecam_env.sensor import CATALOGUE
-    >>> [effect.name for effect in having("image", [CATALOGUE["optical_blur"](), CATALOGUE["dead_time"]()])]
-    ['optical_blur']
+    Example:
+        >>> from spikecam_env.sensor import CATALOGUE
+        >>> [effect.name for effect in having("image", [CATALOGUE["optical_blur"](), CATALOGUE["dead_time"]()])]
+        ['optical_blur']
     """
     return [effect for effect in effects if effect.overrides(hook)]
 
 
 def neighbour_sum(values: Floats) -> Floats:
-    """Sum over each pixel's four neighbours (..., H, W); beyond the edge there is nothing.
+    """Sum over each pixel's four neighbours (..., H, W), zero beyond the edge.
 
-    >>> neighbour_sum(np.ones((3, 3))).tolist()
-    [[2.0, 3.0, 2.0], [3.0, 4.0, 3.0], [2.0, 3.0, 2.0]]
+    Example:
+        >>> neighbour_sum(np.ones((3, 3))).tolist()
+        [[2.0, 3.0, 2.0], [3.0, 4.0, 3.0], [2.0, 3.0, 2.0]]
     """
     total = np.zeros_like(values)
     total[..., 1:, :] += values[..., :-1, :]
@@ -452,8 +475,9 @@ def neighbour_sum(values: Floats) -> Floats:
 def check_parts(effects: Sequence[Effect], frame_rate_hz: float) -> None:
     """Raise InputError for a reference that moves too fast within a frame.
 
-    >>> from spikecam_env.sensor import CATALOGUE
-    >>> check_parts([CATALOGUE["supply_ripple"](frequency_hz=50.0)], frame_rate_hz=40_000.0)  # slow: no error
+    Example:
+        >>> from spikecam_env.sensor import CATALOGUE
+        >>> check_parts([CATALOGUE["supply_ripple"](frequency_hz=50.0)], frame_rate_hz=40_000.0)  # slow: no error
     """
     for effect in effects:
         parts = effect.parts(frame_rate_hz)
@@ -466,11 +490,12 @@ def check_parts(effects: Sequence[Effect], frame_rate_hz: float) -> None:
 
 
 def build(catalogue: dict[str, type[Effect]], name: str, parameters: dict[str, Any]) -> Effect:
-    """Make an effect from its name and parameters; raises InputError for a name or parameter that is not there.
+    """Make an effect from its name and parameters; InputError for an unknown one.
 
-    >>> from spikecam_env.sensor import CATALOGUE
-    >>> build(CATALOGUE, "dead_time", {"tau_us": 0.2})
-    DeadTime(tau_us=0.2)
+    Example:
+        >>> from spikecam_env.sensor import CATALOGUE
+        >>> build(CATALOGUE, "dead_time", {"tau_us": 0.2})
+        DeadTime(tau_us=0.2)
     """
     if name not in catalogue:
         raise unknown_name("effect", name, catalogue)

@@ -1,4 +1,4 @@
-"""Blooming: charge beyond what a pixel can take in a frame flows over to its four neighbours.
+"""Blooming: charge beyond the capacity of a pixel in a frame flows over to its four neighbours.
 
     spill = s max(x - full, 0);   x <- x - spill + (spill of the four neighbours) / 4
 
@@ -52,7 +52,7 @@ class Blooming(Effect):
 
 @njit(cache=True, nogil=True, error_model="numpy", boundscheck=False)
 def _spill_over(x: Floats, half: Floats, share: float, full: float, out: Floats) -> None:
-    """out (F, H, W), overwritten: the charge x, half more or less at a frame's ends, with what flows over."""
+    """out (F, H, W), overwritten: the charge x, half more or less at a frame's ends, with the overflow."""
     frames, rows, columns = x.shape
     spill = np.zeros((rows + 2, columns + 2))  # beyond the edge there is nothing
     for f in range(frames):

@@ -45,7 +45,7 @@ class ClockFeedthrough(Effect):
         6.0,
         unit="us",
         bounds=(0.2, 250.0),
-        doc="time constant of the decay; far beyond a frame what is left is a saw-tooth of height a / tau",
+        doc="time constant of the decay; far beyond a frame the rest is a saw-tooth of height a / tau",
     )
 
     stage = Stage.THRESHOLD

@@ -22,9 +22,10 @@ from spikecam_env.types import Floats
 
 
 class Edge(NamedTuple):
-    """at: how late the last read-out came [standard deviations].  rng: what draws the next."""
+    """The last edge."""
 
     at: float
+    """Delay of the last read-out [standard deviations]."""
     rng: np.random.Generator
 
 

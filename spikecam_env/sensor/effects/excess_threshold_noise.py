@@ -2,7 +2,7 @@
 
     kappa^2 = (sigma_reset^2 + sigma^2) / V_d^2
 
-Stage: threshold.  Seen in: the k-slope of A_k, T^2 kappa^2, above what kT/C and shot noise give.
+Stage: threshold.  Seen in: the k-slope of A_k, T^2 kappa^2, above that of kT/C and shot noise.
 Twins: reset_noise (same law, its strength known from C), shot_noise (separated by a second V_d).
 Within a frame: at the crossing; drawn anew at the reset.
 Source: comparator input noise, white and sampled once a spike; about 1 mV rms in CMOS comparators.

@@ -5,7 +5,7 @@
 
 Stage: reset.  Seen in: flats over a wide range of levels; steps of light (the first interval after one is off).
 Twins: photodiode_lag (follows the light, in static light nothing), dead_time (the same at all levels).
-Within a frame: at the end of the frame; what is left may take a pixel to its threshold once more in the frame, a spike
+Within a frame: at the end of the frame; charge left may take a pixel to its threshold once more in the frame, a spike
 that is lost.  Of light that comes unevenly, the interval is timed as if it came evenly (refused beyond 1 %).
 Source: image lag of a soft reset (Pain et al. 1999, sub-threshold reset); exponential filling of slow states assumed.
 """

@@ -21,11 +21,13 @@ from spikecam_env.sensor.effects.identification import Identification, Needs
 
 
 class Walk(NamedTuple):
-    """at: the walk's value.  rng: what drives it from frame to frame.  within: what drives it within frames."""
+    """State of the random walk."""
 
     at: float
     rng: np.random.Generator
+    """For steps from frame to frame."""
     within: np.random.Generator
+    """For the walk within frames."""
 
 
 @dataclass(frozen=True)

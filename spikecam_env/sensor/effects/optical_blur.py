@@ -3,7 +3,7 @@
     L <- G_s * L        G_s(n) ~ exp(-n^2 / 2 v) along rows and columns; the picture goes on beyond its edge as it ends
 
 v gives the weights the variance s^2.  A Gaussian sampled at pixels has it from 0.7 pixels on (v = s^2), but vanishes
-below 0.3, where an edge in motion, averaged over each pixel, still loses s^2 / 2 of it to each side.
+below 0.3.  There an edge in motion, averaged over each pixel, still loses s^2 / 2 of it to each side.
 
 Stage: optics.  Seen in: textured or moving light: edges are erf(x / (sqrt(2) s)); flats are unchanged.
 Twins: crosstalk (electrical: also a coincidence of spikes), photodiode_lag (blurs motion, not static texture).

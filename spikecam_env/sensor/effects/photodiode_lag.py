@@ -58,7 +58,7 @@ class PhotodiodeLag(Effect):
         return Charge(late.reshape(shape), 1.0, rises.reshape(shape)), dark, slow.reshape(now.shape)
 
     def _law(self, now: ExposureBlock) -> tuple[float, ...]:
-        """What a frame makes of light x + d (t - 1/2) and of s, what lags at its start: see `_follow`."""
+        """Weights of light x + d (t - 1/2) and of the charge s that lags at a frame's start: see `_follow`."""
         tau = self.tau_us * 1e-6 * now.frame_rate_hz
         kept = math.exp(-1.0 / tau)
         mean = -tau * math.expm1(-1.0 / tau)
@@ -74,9 +74,9 @@ def _flat(values: Floats, shape: tuple[int, int, int]) -> Floats:
 def _follow(
     x: Floats, d: Floats, fraction: float, law: tuple[float, ...], slow: Floats, mean: Floats, rise: Floats
 ) -> None:
-    """mean, rise (F, P), overwritten: charge of which a part is late.  x, d: (F or 1, P).  slow (P,): what lags.
+    """mean, rise (F, P), overwritten: charge of which a part is late.  x, d: (F or 1, P).  slow (P,): charge that lags,
 
-    What lags is s(t) = L(t) - d tau + (s - x + d/2 + d tau) exp(-t/tau).
+    s(t) = L(t) - d tau + (s - x + d/2 + d tau) exp(-t/tau).
     """
     kept, kept_rise, late, late_rise, reach, moment = law
     x_moves, d_moves = x.shape[0] > 1, d.shape[0] > 1

@@ -33,16 +33,17 @@ _LONGEST = 1 << 50
 
 
 class Traps(NamedTuple):
-    """pixels: flat indices (n,) of those with a trap.  upper: (n,) which are in the upper state.
-
-    charge: (n,) thresholds a frame in that state.  switches: (k,) those to come, ascending, at least one [ticks]: the
-    n traps' first frames one after the other, then their second frames, from the next frame on.  rng: what draws more.
-    """
+    """The traps of a unit, and their next switches."""
 
     pixels: NDArray[np.intp]
+    """Flat indices (n,) of pixels with a trap."""
     upper: NDArray[np.bool_]
+    """(n,), in the upper state."""
     charge: Floats
+    """(n,) thresholds a frame in that state."""
     switches: NDArray[np.int64]
+    """(k,) to come, ascending, at least one [ticks]: the n traps' first frames one after the other, then their second
+    frames, from the next frame on."""
     rng: np.random.Generator
 
 
@@ -93,7 +94,10 @@ def share_in_upper(
 ) -> tuple[Floats, NDArray[np.bool_]]:
     """Share (F, n) of each frame that each trap spends in the upper state, and the state after them.
 
-    upper: (n,) before them.  switches: as of `Traps`, those of these frames.
+    Args:
+        upper: (n,) before these frames.
+        switches: as of `Traps`, of these frames.
+        frames: how many, F.
     """
     place, tick = np.divmod(switches, TICKS)
     odd = np.bincount(place, minlength=frames * upper.size).reshape(frames, upper.size) % 2 == 1

@@ -6,8 +6,8 @@
     the array's clock at u of a row's own frame (u: 0 .. 1): v = u - e
 
 Stage: read-out.  Seen in: steps of light (a row's response comes up to |s| frames later), moving edges (a slant).
-In static light it acts through what follows the array's clock alone: the phase of supply_ripple and clock_feedthrough
-then differs from row to row.
+In static light it acts only through effects that follow the array's clock: the phase of supply_ripple and
+clock_feedthrough then differs from row to row.
 Within a frame: integrated over the frame, in light that is linear in it.
 Source: sequential read-out of rows, as in a rolling shutter; a wall recording by a public camera has s near -1.1.  The
 light x_t of a frame rises by d_t from its start to its end: exact where it is linear in a frame.  Before frame 0 it is

@@ -28,9 +28,10 @@ _LONGEST = 1 << 52
 
 
 class Strikes(NamedTuple):
-    """at: the next bits struck, as frame * pixels + pixel (n,), in order, at least one.  rng: what draws the gaps."""
+    """The next bits struck."""
 
     at: NDArray[np.int64]
+    """As frame * pixels + pixel (n,), in order, at least one."""
     rng: np.random.Generator
 
 

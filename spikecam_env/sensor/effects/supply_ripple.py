@@ -7,8 +7,8 @@ linear in 32 parts of a period, within half a per cent of rho.  Up to 32 periods
 clock: with readout_skew rows see the ripple shifted.
 Stage: threshold.  Seen in: light and dark: a line at f in the population's rate, amplitude rho at all levels.
 Twins: light_flicker (dark separates them), common_threshold_noise (no line).
-Within a frame: at the crossing, in charge that comes evenly over the frame.  Ripple is bounded to 5 %: at 10 % and
-1 kHz the fast engine is off by 3 % of A_1 at N = 500, and at 15 % and 17 kHz both engines by 0.4 % in the rate.
+Within a frame: at the crossing, in charge that comes evenly over the frame.  Ripple is bounded to 5 %.  At 10 % and
+1 kHz the fast engine is off by 3 % of A_1 at N = 500; at 15 % and 17 kHz both engines by 0.4 % in the rate.
 Source: rectified mains ripples at 100 or 120 Hz, converters from 100 kHz; 0.1 % of the supply is typical.
 """
 

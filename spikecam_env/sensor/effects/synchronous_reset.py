@@ -4,7 +4,7 @@
 
 Stage: reset.  Seen in: flats (intervals locked to whole frames).
 Within a frame: at the crossing, exactly; of a share, each electron after it brings so much less.
-Source: what simulators do that set the accumulator to zero.
+Source: simulators that set the accumulator to zero.
 """
 
 from __future__ import annotations

@@ -23,10 +23,12 @@ from spikecam_env.sensor.random_fields import Words, octave_field, words
 
 
 class Octaves(NamedTuple):
-    """value: (octaves, H, W) [mV], fastest first.  words: what drives each of them."""
+    """State of the octaves."""
 
     value: NDArray[np.float32]
+    """(octaves, H, W) [mV], fastest first."""
     words: tuple[Words, ...]
+    """Keys of the draws of each."""
 
 
 @dataclass(frozen=True)

@@ -1,10 +1,10 @@
-"""A frame at a time at the price of many: under light that stays, frames are worked out before they are asked for.
+"""A frame at a time at the price of many: under light that stays, frames are computed ahead of their calls.
 
 A call for one frame must touch every pixel's state; a call for sixty-four touches it as often.  Where calls for single
-frames follow each other under one light, or one film, the next frames are therefore worked out together and kept as
-bits.  Each later call first compares its light, every pixel, with the light they were worked out from.  Where that has
-changed, the pixels go back to where they were, and the frames that were handed out are worked out again: no bit can
-depend on it.  How far ahead grows with success, so that light that often changes costs little.
+frames follow each other under one light, or one film, the next frames are therefore computed together and kept as
+bits.  Each later call first compares its light, every pixel, with the light of these frames.  Where that has changed,
+the pixels are restored, and the frames that were delivered are computed again: no bit can depend on it.  The distance
+ahead grows with success, so that light that often changes costs little.
 """
 
 from __future__ import annotations
@@ -14,58 +14,59 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from spikecam_env.compiled import njit
 from spikecam_env.sensor.kernels import fast
-from spikecam_env.sensor.kernels.intrinsics import use_widest_vectors
-from spikecam_env.sensor.light import MAX_SEGMENT, Segment
+from spikecam_env.sensor.light import MAX_SEGMENT, Segment, same_light
 from spikecam_env.sensor.unit import Unit
+from spikecam_env.types import Floats, Spikes
 
-FEW = 4
-"""Frames a call for which looking ahead can pay."""
+SHORT_CALL = 4
+"""Most frames of a call for which looking ahead can pay."""
 
 _SAMPLED = 61
-"""Pixels that tell, before the work is done, whether light is likely to stay."""
+"""Pixels of which light is compared to predict whether it stays."""
 
 
 @dataclass
 class Ready:
-    """Frames worked out: the segment they are of, with light of its own, their bits, and how many were handed out.
-
-    remaining, fired: the pixels before them.
-    """
+    """Frames computed ahead."""
 
     segment: Segment
+    """Of these frames, with light of its own."""
     packed: NDArray[np.uint8]
+    """Their bits."""
     served: int
+    """How many were delivered."""
     remaining: NDArray[np.int32]
+    """Of the pixels before them."""
     fired: NDArray[np.uint32]
+    """Of the pixels before them."""
 
 
 @dataclass
 class AheadState:
-    """pixels: after the frames that are ready, if any are.  reach: how many frames to look ahead next time.
-
-    sample: some of the light of the last call.
-    """
+    """Pixels of the fast engine, and frames computed ahead."""
 
     pixels: fast.FastState
+    """After the frames that are ready, if any are."""
     ready: Ready | None = None
     reach: int = 0
+    """Frames to look ahead next time."""
     sample: bytes = b""
+    """Some of the light of the last call."""
 
 
-def start(unit: Unit, phase: NDArray[np.float64], seed: int) -> AheadState:
+def start(unit: Unit, phase: Floats, seed: int) -> AheadState:
     """As `fast.start`."""
     return AheadState(fast.start(unit, phase, seed))
 
 
 def run(
-    state: AheadState, segment: Segment, out: NDArray[np.uint8] | None = None, *, threads: int | None = None
+    state: AheadState, segment: Segment, out: Spikes | None = None, *, threads: int | None = None
 ) -> NDArray[np.uint8]:
     """As `fast.run`, with the same bits."""
-    if state.ready is not None and not _goes_on(state.ready, segment):
-        take_back(state)
-    if state.ready is None and segment.count <= FEW:
+    if state.ready is not None and not _continues(state.ready, segment):
+        roll_back(state)
+    if state.ready is None and segment.count <= SHORT_CALL:
         look_ahead(state, segment, threads)
     ready = state.ready
     if ready is None:
@@ -79,7 +80,7 @@ def run(
 
 
 def look_ahead(state: AheadState, segment: Segment, threads: int | None) -> None:
-    """Work out as many frames as have lately been of use, from this segment's first on."""
+    """Compute as many frames as have lately been of use, from this segment's first on."""
     sample = _sample(segment)
     if sample == state.sample:
         state.reach = max(state.reach, 2 * segment.count)
@@ -99,8 +100,8 @@ def look_ahead(state: AheadState, segment: Segment, threads: int | None) -> None
     state.ready = Ready(ours, fast.run_packed(state.pixels, ours, threads=threads), 0, *before)
 
 
-def take_back(state: AheadState) -> None:
-    """Pixels as they are after the frames that were handed out, and none ready."""
+def roll_back(state: AheadState) -> None:
+    """Restore the pixels to the end of the frames that were delivered, with none ready."""
     ready = state.ready
     if ready is None:
         return
@@ -111,8 +112,8 @@ def take_back(state: AheadState) -> None:
     state.ready, state.reach = None, 0
 
 
-def _goes_on(ready: Ready, segment: Segment) -> bool:
-    """Whether the frames asked for are among those that are ready, and every pixel's light is what it was."""
+def _continues(ready: Ready, segment: Segment) -> bool:
+    """Whether this segment's frames are ready, in the same light of every pixel."""
     ours = ready.segment
     steady = _is_steady(segment)
     if steady != _is_steady(ours) or ready.served + segment.count > ours.count:
@@ -129,19 +130,3 @@ def _is_steady(segment: Segment) -> bool:
 def _sample(segment: Segment) -> bytes:
     every = max(1, segment.radiance0.size // _SAMPLED)
     return segment.radiance0[::every].tobytes() + segment.radiance1[::every].tobytes()
-
-
-def same_light(a: NDArray[np.float32], b: NDArray[np.float32]) -> bool:
-    """Whether two pictures have the same values, every pixel."""
-    if a.flags.c_contiguous and a.flags.writeable:
-        return bool(_same_words(a.view(np.uint32), b.view(np.uint32)))
-    return np.array_equal(a, b)
-
-
-@njit(cache=True, nogil=True, boundscheck=False)
-def _same_words(a: NDArray[np.uint32], b: NDArray[np.uint32]) -> bool:
-    use_widest_vectors()
-    different = np.uint32(0)
-    for i in range(a.size):
-        different |= np.uint32(a[i] ^ b[i])
-    return different == 0  # type: ignore[no-any-return]

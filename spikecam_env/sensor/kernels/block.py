@@ -1,12 +1,12 @@
 """The block kernel of the fast engine: every effect, a block of frames at a time.
 
-The effects' hooks say once a block what arrives and how the references move (`drive`); a compiled loop (`block_loop`)
-then goes from frame to frame and does what depends on the spikes, from the numbers of `Feedback`.
+The effects' hooks give once a block the charge that arrives and the motion of references (`drive`).  A compiled loop
+(`block_loop`) then goes from frame to frame and applies the numbers of `Feedback` to spikes.
 
 Noise is the jump kernel's: a pixel fires when its expected charge has advanced by Gamma(N, 1) / N, with the reset's
-draw mixed in.  N counts where the reference stands at the reset, and not the light that falls while the node is held.
-What moves the reference, or the charge at the frame's end (`kick`), by delta from there to the next spike is taken
-without the shot noise of delta: of a spike's variance a share |delta|, 1 % where a reference moves by 1 % of the swing.
+draw mixed in.  N counts the level of the reference at the reset, and not the light that falls while the node is held.
+Later shifts delta of the reference, and of the charge at the frame's end (`kick`), come without shot noise: of a
+spike's variance a share |delta|, 1 % where a reference moves by 1 % of the swing.
 """
 
 from __future__ import annotations
@@ -21,31 +21,31 @@ import numpy as np
 from numpy.typing import NDArray
 
 from spikecam_env.sensor import drive
+from spikecam_env.sensor.compiled_tools.quantile import MIN_ELECTRONS
 from spikecam_env.sensor.effects.base import Charge, Effect, ExposureBlock, Feedback, Few, having
 from spikecam_env.sensor.kernels import block_loop, fast, loop
-from spikecam_env.sensor.kernels.quantile import MIN_ELECTRONS
 from spikecam_env.sensor.light import GRAINS, Piece, Ramp, Segment, pieces_of, rise_of
 from spikecam_env.sensor.unit import Unit
 from spikecam_env.threads import as_many_as_pay, together
-from spikecam_env.types import Floats
+from spikecam_env.types import Floats, Pictures, Spikes
 
 _BLOCK = 1 << 22
-"""Pixel-steps of a block, at most: what differs from pixel to pixel and frame to frame then takes 32 megabytes."""
+"""Most pixel-steps of a block: an array of pixels and frames then takes 32 megabytes."""
 
 _MOVING = 1 << 16
-"""Where light moves, since a dozen such arrays are then made of it: half a megabyte each, which a cache holds and the
-allocator keeps; fresh pages cost up to four times the arithmetic."""
+"""Most pixel-steps where light moves, which makes a dozen such arrays: half a megabyte each, which a cache holds and
+the allocator keeps.  Fresh pages cost up to four times the arithmetic."""
 
 _NODES = 1 << 20
-"""Nodes of a block at which references that move within the frame stand, at most: eight megabytes."""
+"""Most nodes of a block with references that move within the frame: eight megabytes."""
 
-_STILL = drive.Sway(np.empty((1, 0)), np.empty((1, 1, 0)), np.empty((1, 1, 0)))
+_NO_SWAY = drive.Sway(np.empty((1, 0)), np.empty((1, 1, 0)), np.empty((1, 1, 0)))
 
-_NOBODY = Few(np.empty(0, np.intp), np.empty((1, 0)))
+_NO_FEW = Few(np.empty(0, np.intp), np.empty((1, 0)))
 
 _FEWEST, _LONGEST = 8, 256
-"""Frames of a block, even of a large array: what a block costs besides is shared by so many; and even of a small one:
-what rows and single pixels have of their own in each frame then stays in the cache."""
+"""Fewest frames of a block, whatever the array, which share its overhead, and most: numbers of rows and single pixels
+in each frame then stay in the cache."""
 
 
 def missing(effects: Sequence[Effect]) -> list[str]:
@@ -54,7 +54,7 @@ def missing(effects: Sequence[Effect]) -> list[str]:
 
 
 def missing_of(unit: Unit) -> list[str]:
-    """What of a given unit's law this kernel, and the jump kernel, do not carry."""
+    """Parts of a given unit's law that this kernel, and the jump kernel, do not carry."""
     certain_dark = unit.shot and not unit.dark_is_noisy
     few = unit.shot and float(unit.electrons.min()) < MIN_ELECTRONS
     return ["unit.dark_is_noisy=false"] * certain_dark + [f"unit.electrons below {MIN_ELECTRONS:g}"] * few
@@ -62,14 +62,17 @@ def missing_of(unit: Unit) -> list[str]:
 
 @dataclass(frozen=True)
 class BlockLaw:
-    """A unit in the loop's numbers: gain and dark (P,) float32 [grains/frame], per_electron (1/N, 0 without shot noise)
-    and kappa_squared (P,), and the polynomial that is the law of a spike's charge."""
+    """A unit in the loop's numbers, (P,) each."""
 
-    gain: NDArray[np.float32]
-    dark: NDArray[np.float32]
+    gain: Pictures
+    """[grains/frame]."""
+    dark: Pictures
+    """[grains/frame]."""
     per_electron: Floats
+    """1/N, 0 without shot noise."""
     kappa_squared: Floats
     polynomial: tuple[np.float32, ...]
+    """Law of a spike's charge."""
 
     def __deepcopy__(self, memo: dict[int, Any]) -> BlockLaw:
         return self  # never written to
@@ -77,21 +80,23 @@ class BlockLaw:
 
 @dataclass
 class BlockState:
-    """Pixels mid-stream.
-
-    charge, threshold: (P,) float64 [grains].  fired: (P,) uint32 spikes so far.  activity: (H,) share of a row that
-    fired in the last frame.  crossing: (P,) time of the last crossing [frames].  frame: number of the next.
-    seeds: the two words that, with a pixel's number and its spike's, fix every draw.  memory: the effects'.
-    """
+    """Pixels mid-stream."""
 
     law: BlockLaw
     charge: Floats
+    """(P,) [grains]."""
     threshold: Floats
+    """(P,) [grains]."""
     fired: NDArray[np.uint32]
+    """(P,) spikes so far."""
     activity: Floats
+    """(H,) share of a row that fired in the last frame."""
     crossing: Floats
+    """(P,) time of the last crossing [frames]."""
     frame: int
+    """Number of the next."""
     seeds: tuple[np.uint32, np.uint32]
+    """With the numbers of a pixel and of its spike they fix every draw."""
     memory: drive.Memory
 
 
@@ -120,13 +125,14 @@ def run(
     effects: Sequence[Effect],
     state: BlockState,
     segments: Iterable[Segment],
-    spikes: NDArray[np.uint8],
+    spikes: Spikes,
     *,
     threads: int | None = None,
-) -> NDArray[np.uint8]:
+) -> Spikes:
     """Advance `state` over segments; writes their spikes to `spikes` (all frames, P) uint8, 0 or 1, and returns it.
 
-    first, effects: as given to `start`.  threads: default NUMBA_NUM_THREADS.
+    Args:
+        threads: default NUMBA_NUM_THREADS.
     """
     done = 0
     longest = _longest(first, effects)
@@ -204,15 +210,15 @@ def _block(
     effects: Sequence[Effect],
     state: BlockState,
     charge: tuple[Floats, Floats | float, Sequence[Piece]],
-    spikes: NDArray[np.uint8],
+    spikes: Spikes,
     threads: int | None,
 ) -> None:
     light, dark = drive.expected_charge(now, effects, state.memory, *charge)
     law = drive.comparators(now, effects, state.memory)
-    sway = law.sway or _STILL
+    sway = law.sway or _NO_SWAY
     feedback = _sum([e.feedback(now) for e in effects])
     light = light if light.few is None else Charge(light.values)
-    few = dark.few or _NOBODY
+    few = dark.few or _NO_FEW
     work: tuple[Any, ...] = (
         now.number,
         now.shape[1],
@@ -262,7 +268,7 @@ def _mean(parts: Sequence[_Part]) -> Floats:
 
 
 def _rise(parts: Sequence[_Part]) -> Floats:
-    """Of that charge within a frame, as `_mean`."""
+    """Rise of that charge within a frame, as `_mean`."""
     if parts[0].light.steady:
         return np.zeros((1, parts[0].light.level.size))
     return np.repeat([p.light.rise / GRAINS for p in parts], [p.count for p in parts], axis=0)
@@ -277,12 +283,12 @@ def _rows(factor: Floats | float, now: ExposureBlock) -> Floats:
 
 
 def _plain(values: Floats) -> Floats:
-    """In C order and writeable, though nobody writes: numba compiles `advance` anew for an array that is read-only."""
+    """The values in C order and writeable: numba compiles `advance` anew for a read-only array."""
     return np.require(values, requirements=("C", "W"))
 
 
 def _sum(feedbacks: Sequence[Feedback]) -> Feedback:
-    """One law of several: losses, kicks and droops add, what is kept multiplies."""
+    """One law of several: losses, kicks and droops add, shares kept multiply."""
     total = Feedback()
     for one in feedbacks:
         total = Feedback(

@@ -2,19 +2,22 @@
 
     charge += max(light light_factor, 0) + max(dark dark_factor, 0)
     while charge >= limit = (threshold factor + grains_per_mV (common + field)) (1 + droop activity):
-        spike;  residual = (charge - limit - what the reset loses) kept;  threshold = GRAINS (1 + s z)
+        spike;  residual = (charge - limit - loss of the reset) kept;  threshold = GRAINS (1 + s z)
 
 The same operations in the same order, in float64, so that without noise the bits are the reference's.  With noise the
 electrons still to come are drawn once a spike, as in the jump kernel (`fast`).  No fastmath.
 
-Where references move within the frame, limits are their least, and who reaches that is looked at again (`crossing`).
+Where references move within the frame, limits are their least; pixels above these are checked again (`crossing`).
 Where spikes kick neighbours at once, a frame's spikes are taken in turn (`fire_in_turn`).
-Where nothing moves from frame to frame, or only what single pixels get, a pixel goes from spike to spike instead
-(`jump`).  Charge is held on a grid (`on_grid`) on which sums are exact: so many frames at once are so many one by one.
+Where nothing moves from frame to frame but charge of single pixels, a pixel goes from spike to spike (`jump`).
+Charge is held on a grid (`on_grid`) on which sums are exact: many frames at once give the bits of one by one.
 
-A line is a row of pixels, or a piece of one that is wider than a band.  Where any of a group of pixels fires, what
-follows a spike is worked out for all of them, and kept for those that did: vector instructions for sixteen cost less
-than to gather, one by one, the few that fired.
+A line is a row of pixels, or a piece of one that is wider than a band.  Where any of a group of pixels fires, a spike
+is computed for all of them, and kept for those that fired: vector instructions for sixteen cost less than to gather,
+one by one, the few that fired.
+
+Names throughout: x, words, hit are a band's scratch as float64, uint32, and its row HIT as uint8; live lists the starts
+of groups in which a pixel fires; reset, left and left_tau are numbers of `Feedback`.
 """
 
 from __future__ import annotations
@@ -27,9 +30,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from spikecam_env.compiled import njit
+from spikecam_env.sensor.compiled_tools.draws import GOLDEN, first_key, second_key, standard
 from spikecam_env.sensor.crossing import MOST_AGAIN, NEVER, crossing_between
 from spikecam_env.sensor.decay import LONG, decayed
-from spikecam_env.sensor.kernels.draws import GOLDEN, first_key, second_key, standard
 from spikecam_env.sensor.light import GRAINS, LEAST_LIMIT, MOST_GRAINS
 from spikecam_env.sensor.light import on_grid as rounded
 from spikecam_env.types import Floats, Pictures
@@ -41,29 +44,27 @@ Polynomial = tuple[np.float32, ...]
 Reset = tuple[float, ...]
 """The first three numbers of `Feedback`: per_root_rate, per_rate, kept."""
 Band = tuple[Places, Places, Places, Places]
-"""Of its lines: row, first pixel, width, place; see `laid_out`."""
+"""Row, first pixel, width and place of its lines; see `lay_out`."""
 Waves = tuple[Floats, Floats]
 """Factor and common [mV] at the nodes."""
-OfPixel = tuple[float, float, float]
-"""Its field [mV], grains_per_mV, its load."""
-Wave = tuple[Floats, Floats, Floats, OfPixel]
-"""Of one pixel: nodes, factor and common there, and what is its own."""
-OfFew = tuple[Floats, Floats, Floats, Floats, Floats]
-"""Light, dark, their factors (n,), and what comes besides (F, n)."""
+PixelNumbers = tuple[float, float, float]
+"""Field [mV], grains_per_mV and load of a pixel."""
+Wave = tuple[Floats, Floats, Floats, PixelNumbers]
+"""Nodes, factor and common there, and the numbers of a pixel."""
+FewCharge = tuple[Floats, Floats, Floats, Floats, Floats]
+"""Light, dark, their factors (n,), and extra dark charge (F, n) of the few pixels that have some."""
 
 BAND = 1024
-"""Pixels of a band: what is worked on frame after frame stays in the processor's cache."""
+"""Pixels of a band: its scratch stays in the processor's cache, frame after frame."""
 
 GROUP = 16
-"""Pixels that are worked out together where one of them fires (LLVM would make no vector instructions of fewer)."""
+"""Pixels that are computed together where one of them fires (LLVM would make no vector instructions of fewer)."""
 
-WORTH, SPARSE = 4, 0.5
-"""Frames of a block from which on, and spikes a pixel and frame up to which, going from spike to spike is faster than
-going from frame to frame."""
+FEWEST_FRAMES, SPARSE = 4, 0.5
+"""Fewest frames of a block, and most spikes a pixel and frame, for which going from spike to spike is faster."""
 
-DRAWS, DECAY, CROSSING = 0x3BD9BCE3, 0xFDEE1FA, 0xADDA886E
-"""Checksums of the draws, the decay and the crossings within a frame compiled in: numba's cache sees a change of this
-file, not of those it imports from."""
+DRAWS, DECAY, CROSSING = 0x98AA1746, 0xB1E4BA7D, 0xD8275A88
+"""Checksums of files compiled in: numba's cache sees a change of this file, not of those it imports from."""
 
 decay = njit(inline="always")(decayed)
 on_grid = njit(inline="always")(rounded)
@@ -85,8 +86,8 @@ _PIXEL, _FIRST, _SECOND, _FIRED, _DRAW, _DUE, _AWAKE, _AGAIN, _EXTRA = (
 _HIT, _SEEN = (8 * 19 * BAND + row * BAND for row in range(2))  # of 8 bits
 _SCRATCH = 20 * BAND
 _NONE = 0xFFFFFFFF
-_LEAST = 1e-30  # what arrives where nothing does, to divide by
-_INSIDE = BAND - 1  # a group's start masked with it is plainly not negative: numba then leaves wrapping indices out
+_LEAST = 1e-30  # divides where no charge arrives
+_INSIDE = BAND - 1  # masks a group's start: not negative, so that numba leaves wrapping indices out
 
 
 @njit(cache=True, nogil=True, error_model="numpy", boundscheck=False)
@@ -139,16 +140,25 @@ def advance(
     crossing: Floats,
     spikes: Bytes,
 ) -> None:
-    """Frames `number` .. of the rows top .. bottom.  F frames, H rows of `columns` pixels, P pixels in all.
+    """Frames of the rows top .. bottom: F frames, H rows of `columns` pixels, P pixels in all; float64 unless stated.
 
-    light, dark: (F or 1, P) [thresholds]; extra: (F, n), what the pixels few (n,), ascending, get in the dark besides.
-    light_factor, dark_factor, factor, common [mV]: (F, H).  field: (F or 1, P) float32 [mV].  grains_per_mV: (P,).
-    at, swayed_factor, swayed_common: nodes of `drive.Sway`, none where no reference moves within a frame; where one
-    does, factor and common are the least of each frame.
-    feedback: the numbers of `Feedback`, in its order.  per_electron (1/N), kappa_squared: (P,).  polynomial: 8 float32.
-    seed_low, seed_high: uint32.
-    charge, threshold: (P,) [grains], fired: (P,) uint32, activity: (H,), crossing: (P,) [frames]; updated.
-    spikes: (F, P) uint8, overwritten.  What is not said to be otherwise is float64.
+    Args:
+        top, bottom: first row, and row after the last.
+        number: of the first frame.
+        columns: pixels of a row.
+        light, dark: (F or 1, P) [thresholds].
+        few, extra: pixels (n,), ascending, with extra dark charge (F, n).
+        light_factor, dark_factor: (F, H).
+        factor, common: (F, H), common in mV; the least of each frame.
+        field: (F or 1, P) float32 [mV].
+        grains_per_mV, per_electron, kappa_squared: (P,), per_electron 1/N.
+        at, swayed_factor, swayed_common: nodes of `drive.Sway`, none where no reference moves within a frame.
+        feedback: the numbers of `Feedback`, in its order.
+        polynomial: 8 float32, law of a spike's charge.
+        seed_low, seed_high: uint32.
+        charge, threshold, fired, crossing: (P,) [grains, frames], fired uint32; updated.
+        activity: (H,), updated.
+        spikes: (F, P) uint8, overwritten.
     """
     kick, left, left_tau, droop, at_once = feedback[3:]
     at_once = on_grid(at_once * _G)
@@ -159,7 +169,7 @@ def advance(
     moves = moves or differ(light_factor) or differ(dark_factor) or differ(factor) or differ(common)
     sways = at.shape[1] > 0
     f_moves, c_moves = swayed_factor.shape[0] > 1, swayed_common.shape[0] > 1
-    alone = not moves and not sways and kick == 0.0 and frames >= WORTH
+    alone = not moves and not sways and kick == 0.0 and frames >= FEWEST_FRAMES
     whole = kick != 0.0 or at_once != 0.0
     jumps = False
     pieces = (columns + BAND - 1) // BAND
@@ -167,10 +177,10 @@ def advance(
     lines = BAND // pitch
     bands = ((bottom - top) * pieces + lines - 1) // lines
     together = bands if whole or (droop != 0.0 and pieces > 1) else 1
-    row_of, pixel_of, width_of, slot_of = laid_out(top, bottom, columns, pieces, lines, pitch)
+    row_of, pixel_of, width_of, slot_of = lay_out(top, bottom, columns, pieces, lines, pitch)
     lay = np.stack((pixel_of, width_of, np.arange(row_of.size) // lines * _SCRATCH, slot_of))
     scratch = np.zeros((together, _SCRATCH))
-    scratch[:, _LIMIT : _LIMIT + BAND] = np.inf  # what fills up a line never fires
+    scratch[:, _LIMIT : _LIMIT + BAND] = np.inf  # padding of a line never fires
     stood = np.empty((together, lines, 5))
     live = np.empty(BAND // GROUP, np.int64)
     around = np.empty(columns, np.uint8)
@@ -215,7 +225,9 @@ def advance(
                     was = stood[b, line - begin]
                     if light_moves or dark_moves or a != was[0] or d != was[1]:
                         was[0], was[1], arrived = a, d, True
-                        arrive(lights[p0 : p0 + n], darks[p0 : p0 + n], a, d, x[_ARRIVES + h0 : _ARRIVES + h0 + n])
+                        charge_of_line(
+                            lights[p0 : p0 + n], darks[p0 : p0 + n], a, d, x[_ARRIVES + h0 : _ARRIVES + h0 + n]
+                        )
                     if f != was[2] or load != was[4]:
                         x[_FACTOR + h0 : _FACTOR + h0 + n] = f
                         x[_LOAD + h0 : _LOAD + h0 + n] = load
@@ -237,7 +249,7 @@ def advance(
                         continue
                     p, r = few[i], few_row[i]
                     at_light, at_dark = lights[p] * light_factor[t, r], (darks[p] + extra[t, i]) * dark_factor[t, r]
-                    x[_ARRIVES + place[i]] = gets(at_light, at_dark)
+                    x[_ARRIVES + place[i]] = frame_charge(at_light, at_dark)
                 used = (end - begin) * pitch
                 jumps = alone and t == 0 and x[_ARRIVES : _ARRIVES + used].sum() < SPARSE * _G * used
                 if jumps:
@@ -301,7 +313,9 @@ def advance(
                     )
                     groups = find_live(hit.view(np.uint64), BAND // GROUP, live)
                     once_more = not sways and at_once == 0.0
-                    stay(x, words, hit, live, groups, number + t + 1.0, left, left_tau, once_more, reset, polynomial)
+                    add_left_charge(
+                        x, words, hit, live, groups, number + t + 1.0, left, left_tau, once_more, reset, polynomial
+                    )
             if droop != 0.0:
                 for r in range(row_of[line0], row_of[stop - 1] + 1):
                     activity[r] = bits[r * columns : (r + 1) * columns].sum() / columns
@@ -316,20 +330,20 @@ def advance(
 
 
 @njit(inline="always")
-def gets(light: float, dark: float) -> float:
-    """Charge [grains] of a pixel in one frame, of light and dark [thresholds], neither of which takes any away."""
+def frame_charge(light: float, dark: float) -> float:
+    """Charge [grains] of a pixel in one frame, from light and dark [thresholds], neither below zero."""
     return on_grid(min((max(light, 0.0) + max(dark, 0.0)) * _G, _MOST))  # type: ignore[no-any-return]
 
 
 @njit(inline="always")
 def differ(values: Floats) -> bool:
-    """Whether any frame's differ from the first's."""
+    """Whether any frame's values differ from the first's."""
     return bool((values != values[0]).any())
 
 
 @njit(inline="always")
-def laid_out(top: int, bottom: int, columns: int, pieces: int, lines: int, pitch: int) -> Band:
-    """Each line's row, its first pixel, how many it has, and its place in a band of so many lines."""
+def lay_out(top: int, bottom: int, columns: int, pieces: int, lines: int, pitch: int) -> Band:
+    """Row, first pixel, width and place in its band of each line."""
     line = np.arange((bottom - top) * pieces)
     rows, starts = top + line // pieces, line % pieces * BAND
     return rows, rows * columns + starts, np.minimum(columns - starts, BAND), line % lines * pitch
@@ -342,10 +356,10 @@ def copy(values: NDArray[Any], out: NDArray[Any]) -> None:
 
 
 @njit(inline="always")
-def arrive(light: Floats, dark: Floats, light_factor: float, dark_factor: float, out: Floats) -> None:
-    """Charge of a row in one frame [grains]."""
+def charge_of_line(light: Floats, dark: Floats, light_factor: float, dark_factor: float, out: Floats) -> None:
+    """Charge of a line in one frame [grains]."""
     for j in range(out.size):
-        out[j] = gets(light[j] * light_factor, dark[j] * dark_factor)
+        out[j] = frame_charge(light[j] * light_factor, dark[j] * dark_factor)
 
 
 @njit(inline="always")
@@ -360,7 +374,7 @@ def references(
     stands: Floats,
     limit: Floats,
 ) -> None:
-    """Of a line in one frame [grains]: what moves the references, where they stand at a reset, where pixels fire."""
+    """Of a line in one frame [grains]: shifts of the references, their levels at a reset, and limits of the pixels."""
     for j in range(limit.size):
         moved[j] = grains_per_mV[j] * (common + field[j])
     for j in range(limit.size):
@@ -371,7 +385,7 @@ def references(
 
 @njit(inline="always")
 def collect(held: Floats, arrives: Floats, limit: Floats, used: int, hit: Bytes) -> None:
-    """One frame's charge; hit: whose reaches the limit."""
+    """Add one frame's charge; hit: pixels at their limit."""
     for j in range(used):
         c = held[j] + arrives[j]
         held[j] = c
@@ -399,7 +413,7 @@ def wake(
     seed_low: np.uint32,
     seed_high: np.uint32,
 ) -> None:
-    """What a pixel's spikes need, in the groups where one fires for the first time: its noise and its keys."""
+    """Noise and keys of pixels, in groups in which one fires for the first time."""
     for g in range(groups):
         q = live[g] & _INSIDE
         if words[_AWAKE + q // GROUP] == 0:
@@ -414,10 +428,7 @@ def wake(
 
 @njit(nogil=True, error_model="numpy", boundscheck=False)
 def fire(x: Floats, words: Words, hit: Bytes, live: Places, groups: int, reset: Reset, polynomial: Polynomial) -> int:
-    """Reset the pixels that fire, draw their next thresholds; returns how many are at these already.
-
-    x, words, hit: the scratch, as float64, uint32 and, of row HIT alone, uint8.
-    """
+    """Reset the pixels that fire, draw their next thresholds; returns how many are at these already."""
     per_root_rate, per_rate, kept = reset
     whole = per_root_rate == 0.0 and per_rate == 0.0 and kept == 1.0
     floats = words.view(np.float32)
@@ -430,7 +441,7 @@ def fire(x: Floats, words: Words, hit: Bytes, live: Places, groups: int, reset: 
             over, electrons = on_grid(x[_HELD + j] - x[_LIMIT + j]), x[_STANDS + j] * (1.0 / _G)
             if not whole:
                 over, electrons = after_reset(over, x[_ARRIVES + j] / _G, x[_STANDS + j], per_root_rate, per_rate, kept)
-            phi = needed(electrons, x[_NOISE + j], x[_JITTER + j], floats[_DRAW + j])
+            phi = next_threshold(electrons, x[_NOISE + j], x[_JITTER + j], floats[_DRAW + j])
             limit = max((phi * x[_FACTOR + j] + x[_MOVED + j]) * x[_LOAD + j], _TRIPS)
             fires = hit[j] != 0
             words[_FIRED + j] = _U(words[_FIRED + j] + _U(hit[j]))
@@ -453,10 +464,12 @@ def find_due(x: Floats, words: Words, live: Places, groups: int) -> None:
 
 @njit(nogil=True, error_model="numpy", boundscheck=False)
 def fire_due(x: Floats, words: Words, live: Places, groups: int, reset: Reset, polynomial: Polynomial) -> int:
-    """As `fire`, of the pixels that are due; what is kept of the others is as it was, as after a spike before it in the
-    frame.  Lists the groups in which some are at their limit again, and returns their number.
+    """As `fire`, of the pixels that are due; the others keep all rows, as after an earlier spike in the frame.
 
     The law is that of `fire`, written out: of a function that returned it LLVM would make no vector instructions.
+
+    Returns:
+        Number of groups, listed, in which some are at their limit again.
     """
     per_root_rate, per_rate, kept = reset
     whole = per_root_rate == 0.0 and per_rate == 0.0 and kept == 1.0
@@ -473,7 +486,7 @@ def fire_due(x: Floats, words: Words, live: Places, groups: int, reset: Reset, p
             over, electrons = on_grid(x[_HELD + j] - x[_LIMIT + j]), x[_STANDS + j] * (1.0 / _G)
             if not whole:
                 over, electrons = after_reset(over, x[_ARRIVES + j] / _G, x[_STANDS + j], per_root_rate, per_rate, kept)
-            phi = needed(electrons, x[_NOISE + j], x[_JITTER + j], floats[_DRAW + j])
+            phi = next_threshold(electrons, x[_NOISE + j], x[_JITTER + j], floats[_DRAW + j])
             limit = max((phi * x[_FACTOR + j] + x[_MOVED + j]) * x[_LOAD + j], _TRIPS)
             fires = words[_DUE + j] != 0
             x[_ELECTRONS + j] = electrons if fires else x[_ELECTRONS + j]
@@ -502,8 +515,7 @@ def fire_within(
     reset: Reset,
     polynomial: Polynomial,
 ) -> None:
-    """As `fire` and `fire_due`, of a band whose references move within the frame; hit: of those that came near, those
-    that fired."""
+    """As `fire` and `fire_due`, of a band whose references move within the frame; hit is cut to pixels that fired."""
     seen = words.view(np.uint8)[_SEEN : _SEEN + BAND]
     near = np.empty(BAND, np.int64)
     for g in range(groups):
@@ -515,7 +527,7 @@ def fire_within(
         for line in range(band[0].size):
             r, p0, n, h0 = band[0][line], band[1][line], band[2][line], band[3][line]
             of_row = at[r if len(at) > 1 else 0], row_waves(r, waves)
-            meet(x, hit, h0, n, near, of_row, field[p0 : p0 + n], grains_per_mV[p0 : p0 + n], loads[r])
+            find_crossings(x, hit, h0, n, near, of_row, field[p0 : p0 + n], grains_per_mV[p0 : p0 + n], loads[r])
         for j in range(BAND):
             words[_DUE + j] = hit[j]
             seen[j] |= hit[j]
@@ -526,7 +538,7 @@ def fire_within(
 
 
 @njit(nogil=True, error_model="numpy", boundscheck=False)
-def meet(
+def find_crossings(
     x: Floats,
     hit: Bytes,
     h0: int,
@@ -537,8 +549,12 @@ def meet(
     grains_per_mV: Floats,
     load: float,
 ) -> None:
-    """Of a line of n pixels from place h0 on, those that hit their least limit: who fires, from moment AT on, at which
-    moment, at which charge (in LIMIT), and where the reference stands then."""
+    """Crossings from moment AT on of the n pixels of a line at place h0 that hit their least limit.
+
+    Args:
+        x: rows AT, LIMIT and STANDS get moment, charge and level of the reference.
+        hit: cut to pixels that fire.
+    """
     at, (factor, common) = of_row
     came = 0
     for i in range(n):
@@ -571,7 +587,9 @@ def fire_in_turn(
 ) -> None:
     """As `fire_within`, of all lines, in the order of moments: each spike kicks its neighbours [grains] at its own.
 
-    lines: first pixel, width, band and place of each, (4, L) int64; loads: of each.  bits: (P,), overwritten.
+    Args:
+        lines: first pixel, width, band and place of each, (4, L) int64.
+        bits: (P,), overwritten.
     """
     x, words, hits = scratch.reshape(-1), scratch.reshape(-1).view(np.uint32), scratch.reshape(-1).view(np.uint8)
     rows, columns = loads.size, bits.size // loads.size
@@ -609,7 +627,7 @@ def fire_in_turn(
             q = p + down * columns + right
             o, j = place_of(row + down, column + right, pieces, lines)
             held, phi, limit = x[o + _HELD + j], x[o + _PHI + j], x[o + _LIMIT + j]
-            kicked(x, o, j, kick)
+            kick_pixel(x, o, j, kick)
             moment, taken = NEVER, 0.0
             if x[o + _HELD + j] >= x[o + _LIMIT + j]:
                 wave = pixel_law(q, columns, at, waves, field, grains_per_mV, loads)
@@ -623,7 +641,7 @@ def fire_in_turn(
 
 
 @njit(inline="always")
-def kicked(x: Floats, o: int, j: int, kick: float) -> None:
+def kick_pixel(x: Floats, o: int, j: int, kick: float) -> None:
     """Give a pixel charge [grains] that brings no shot noise: its threshold loses that of as many electrons."""
     noise, jitter = x[o + _NOISE + j], x[o + _JITTER + j]
     x[o + _HELD + j] += kick
@@ -642,7 +660,7 @@ def place_of(row: int, column: int, pieces: int, lines: Places) -> tuple[int, in
 
 @njit(inline="always")
 def row_waves(row: int, waves: Waves) -> Waves:
-    """Of one row: factor and common (n,) at its nodes."""
+    """Factor and common (n,) of one row at its nodes."""
     factor, common = waves
     return factor[row if len(factor) > 1 else 0], common[row if len(common) > 1 else 0]
 
@@ -658,18 +676,17 @@ def pixel_law(
 
 
 @njit(inline="always")
-def limit_at(phi: float, factor: float, common: float, of_pixel: OfPixel) -> float:
-    """What a threshold [grains] is compared with, however low; of_pixel: its field [mV], grains_per_mV, its load."""
+def limit_at(phi: float, factor: float, common: float, of_pixel: PixelNumbers) -> float:
+    """Level of a threshold [grains], however low."""
     field, grains_per_mV, load = of_pixel
     return (phi * factor + grains_per_mV * (common + field)) * load
 
 
 @njit(inline="always")
 def next_crossing(
-    x: Floats, o: int, j: int, since: float, at: Floats, factor: Floats, common: Floats, of_pixel: OfPixel
+    x: Floats, o: int, j: int, since: float, at: Floats, factor: Floats, common: Floats, of_pixel: PixelNumbers
 ) -> tuple[float, float]:
-    """`crossing.first_crossing` of place j of the scratch that begins at o, whose charge is up to its least limit by
-    the end of the frame: looked for from the node on before which it is not up to that."""
+    """`crossing.first_crossing` at place j of the scratch at o, without the nodes below its least limit."""
     held, gained, phi, least = x[o + _HELD + j], x[o + _ARRIVES + j], x[o + _PHI + j], x[o + _LIMIT + j]
     begin = held - gained
     last = at.size - 1
@@ -688,8 +705,8 @@ def next_crossing(
 
 
 @njit(inline="always")
-def stands_at(moment: float, at: Floats, factor: Floats, common: Floats, of_pixel: OfPixel) -> float:
-    """Where the reference of the nominal threshold stands at a moment [grains]."""
+def stands_at(moment: float, at: Floats, factor: Floats, common: Floats, of_pixel: PixelNumbers) -> float:
+    """Level of the reference of the nominal threshold at a moment [grains]."""
     last = at.size - 1
     k = int(moment * last)
     while k > 0 and at[k] > moment:
@@ -722,7 +739,7 @@ def spike(
     if not (per_root_rate == 0.0 and per_rate == 0.0 and kept == 1.0):
         over, electrons = after_reset(over, x[o + _ARRIVES + j] / _G, stands, per_root_rate, per_rate, kept)
     draw = drawn(words[w + _FIRST + j], words[w + _SECOND + j], words[w + _FIRED + j], polynomial)
-    phi = needed(electrons, x[o + _NOISE + j], x[o + _JITTER + j], draw)
+    phi = next_threshold(electrons, x[o + _NOISE + j], x[o + _JITTER + j], draw)
     words[w + _FIRED + j] = _U(words[w + _FIRED + j] + _U(1))
     words.view(np.float32)[w + _DRAW + j] = draw
     x[o + _ELECTRONS + j], x[o + _HELD + j], x[o + _PHI + j] = electrons, over, phi
@@ -730,7 +747,7 @@ def spike(
 
 
 @njit(nogil=True, error_model="numpy", boundscheck=False)
-def stay(
+def add_left_charge(
     x: Floats,
     words: Words,
     hit: Bytes,
@@ -743,8 +760,11 @@ def stay(
     reset: Reset,
     polynomial: Polynomial,
 ) -> None:
-    """What stays on the photodiode at the resets of the pixels that fired; end: of the frame.  once_more: whether it
-    may take them to their threshold again: where references move within the frame, it does in the next one."""
+    """Add the charge that stays on the photodiode at the resets of the pixels that fired, in the frame before `end`.
+
+    Args:
+        once_more: take pixels to their threshold again; where references move within the frame, the next one does.
+    """
     draws = x.view(np.float32)
     for g in range(groups):
         q = live[g] & _INSIDE
@@ -752,7 +772,7 @@ def stay(
             held, rate = x[_HELD + j] / _G, x[_ARRIVES + j] / _G
             crossed = end - min(max(held / max(rate, 1e-12), 0.0), 1.0)
             stays = left * (decay(min((crossed - x[_CROSSED + j]) / left_tau, LONG)) - 1.0)
-            phi = needed(x[_ELECTRONS + j] + stays, x[_NOISE + j], x[_JITTER + j], draws[_DRAW + j])
+            phi = next_threshold(x[_ELECTRONS + j] + stays, x[_NOISE + j], x[_JITTER + j], draws[_DRAW + j])
             limit = max((phi * x[_FACTOR + j] + x[_MOVED + j]) * x[_LOAD + j], _TRIPS)
             fires = hit[j] != 0
             x[_CROSSED + j] = crossed if fires else x[_CROSSED + j]
@@ -768,8 +788,7 @@ def stay(
 def cross_again(
     x: Floats, words: Words, j: int, end: float, left: float, left_tau: float, reset: Reset, polynomial: Polynomial
 ) -> None:
-    """Resets of a pixel that what stayed takes to its threshold once more, MOST_AGAIN at most, in the frame whose bit
-    is set already; the law is that of `fire` and `stay`."""
+    """Reset a pixel that charge left takes to its threshold again, MOST_AGAIN times at most, by the law of `fire`."""
     per_root_rate, per_rate, kept = reset
     rate = x[_ARRIVES + j] / _G
     for _ in range(MOST_AGAIN):
@@ -783,7 +802,7 @@ def cross_again(
         words.view(np.float32)[_DRAW + j] = draw
         crossed = end - min(max(over / _G / max(rate, 1e-12), 0.0), 1.0)
         stays = left * (decay(min(max(crossed - x[_CROSSED + j], 0.0) / left_tau, LONG)) - 1.0)
-        phi = needed(electrons + stays, x[_NOISE + j], x[_JITTER + j], draw)
+        phi = next_threshold(electrons + stays, x[_NOISE + j], x[_JITTER + j], draw)
         x[_ELECTRONS + j], x[_CROSSED + j], x[_PHI + j] = electrons, crossed, phi
         x[_HELD + j] = on_grid((over / _G - stays) * _G)
         x[_LIMIT + j] = max((phi * x[_FACTOR + j] + x[_MOVED + j]) * x[_LOAD + j], _TRIPS)
@@ -795,7 +814,7 @@ def jump(
     words: Words,
     live: Places,
     groups: int,
-    of_few: OfFew,
+    of_few: FewCharge,
     reset: Reset,
     polynomial: Polynomial,
     number: int,
@@ -803,11 +822,13 @@ def jump(
     left_tau: float,
     spikes: Bytes,
 ) -> None:
-    """All frames of a band in which every pixel goes its own way: from what happens to it to what happens next, that it
-    fires or gets something else.  spikes: (F, P), set where a pixel fires.
+    """All frames of a band in which every pixel goes from event to event: a spike, or a change of its charge.
 
-    of_few: light, dark, their factors (n,) and what comes besides (F, n) of the pixels whose number is in row EXTRA.
-    The law is that of `fire` and `stay`, written out as in `fire_due`.
+    The law is that of `fire` and `add_left_charge`, written out as in `fire_due`.
+
+    Args:
+        of_few: charge of the pixels whose number is in row EXTRA.
+        spikes: (F, P), set where a pixel fires.
     """
     per_root_rate, per_rate, kept = reset
     whole = per_root_rate == 0.0 and per_rate == 0.0 and kept == 1.0
@@ -817,7 +838,7 @@ def jump(
         x[_AT + j], x[_UNTIL + j], words[_AGAIN + j] = 0.0, frames, 0
     for j in range(groups * GROUP):
         if words[_EXTRA + j] != _NONE:
-            x[_UNTIL + j] = stays_until(of_few[4], words[_EXTRA + j], 0)
+            x[_UNTIL + j] = unchanged_until(of_few[4], words[_EXTRA + j], 0)
     while groups:
         for g in range(groups):
             q = live[g] & _INSIDE
@@ -831,7 +852,7 @@ def jump(
                 n = min(n, rest)
                 x[_AT + j] += n
                 x[_HELD + j] = held + n * more
-        groups = note(x, words, live, groups, of_few, spikes)
+        groups = record_events(x, words, live, groups, of_few, spikes)
         for g in range(groups):
             q = live[g] & _INSIDE
             for j in range(q, q + GROUP):
@@ -845,7 +866,7 @@ def jump(
                     over, electrons = after_reset(
                         over, x[_ARRIVES + j] / _G, x[_STANDS + j], per_root_rate, per_rate, kept
                     )
-                phi = needed(electrons, x[_NOISE + j], x[_JITTER + j], floats[_DRAW + j])
+                phi = next_threshold(electrons, x[_NOISE + j], x[_JITTER + j], floats[_DRAW + j])
                 limit = max((phi * x[_FACTOR + j] + x[_MOVED + j]) * x[_LOAD + j], _TRIPS)
                 due = words[_DUE + j] != 0
                 x[_ELECTRONS + j] = electrons
@@ -860,7 +881,7 @@ def jump(
                     held, rate = x[_HELD + j] / _G, x[_ARRIVES + j] / _G
                     crossed = number + x[_AT + j] - min(max(held / max(rate, 1e-12), 0.0), 1.0)
                     stays = left * (decay(min((crossed - x[_CROSSED + j]) / left_tau, LONG)) - 1.0)
-                    phi = needed(x[_ELECTRONS + j] + stays, x[_NOISE + j], x[_JITTER + j], floats[_DRAW + j])
+                    phi = next_threshold(x[_ELECTRONS + j] + stays, x[_NOISE + j], x[_JITTER + j], floats[_DRAW + j])
                     limit = max((phi * x[_FACTOR + j] + x[_MOVED + j]) * x[_LOAD + j], _TRIPS)
                     due = words[_DUE + j] > words[_AGAIN + j]
                     x[_CROSSED + j] = crossed if due else x[_CROSSED + j]
@@ -874,9 +895,12 @@ def jump(
 
 
 @njit(nogil=True, error_model="numpy", boundscheck=False)
-def note(x: Floats, words: Words, live: Places, groups: int, of_few: OfFew, spikes: Bytes) -> int:
-    """What happened to the pixels of live groups: a spike where they are due, else another charge from here on.  Lists
-    the groups in which something may happen yet, and returns their number."""
+def record_events(x: Floats, words: Words, live: Places, groups: int, of_few: FewCharge, spikes: Bytes) -> int:
+    """Events of the pixels of live groups: a spike where they are due, else another charge from here on.
+
+    Returns:
+        Number of groups, listed, in which events may follow.
+    """
     light, dark, light_factor, dark_factor, extra = of_few
     still = 0
     for g in range(groups):
@@ -890,8 +914,8 @@ def note(x: Floats, words: Words, live: Places, groups: int, of_few: OfFew, spik
             elif at < spikes.shape[0]:
                 i = words[_EXTRA + j]
                 at_light, at_dark = light[i] * light_factor[i], (dark[i] + extra[at, i]) * dark_factor[i]
-                x[_ARRIVES + j] = gets(at_light, at_dark)
-                x[_UNTIL + j] = stays_until(extra, i, at)
+                x[_ARRIVES + j] = frame_charge(at_light, at_dark)
+                x[_UNTIL + j] = unchanged_until(extra, i, at)
                 goes_on = True
         live[still] = q
         still += goes_on
@@ -899,8 +923,8 @@ def note(x: Floats, words: Words, live: Places, groups: int, of_few: OfFew, spik
 
 
 @njit(inline="always")
-def stays_until(extra: Floats, i: int, at: int) -> int:
-    """The frame in which what comes besides (F, n) to one of few is no longer what it is in frame `at`; F if none."""
+def unchanged_until(extra: Floats, i: int, at: int) -> int:
+    """First frame after `at` with other extra charge (F, n) of pixel i of the few; F if none."""
     until = at + 1
     while until < extra.shape[0] and extra[until, i] == extra[at, i]:
         until += 1
@@ -917,10 +941,11 @@ def drawn(first: np.uint32, second: np.uint32, number: np.uint32, polynomial: Po
 def after_reset(
     over: float, rate: float, limit: float, per_root_rate: float, per_rate: float, kept: float
 ) -> tuple[float, float]:
-    """Charge after a reset [grains], and how many electrons the next spike still needs [thresholds].
+    """Charge after a reset [grains], and the electrons of which the next spike has noise [thresholds].
 
-    Those up to the limit: light that falls while the node is held never reaches it, nor does its noise; of charge
-    thrown away in part, the rest is known less well than it was.
+    Returns:
+        The charge, and electrons up to the limit: light that falls while the node is held never reaches it, nor does
+            its noise; a part of the charge that is lost leaves a rest that is known less well.
     """
     root, over = math.sqrt(rate), over / _G
     left = ((over - root * per_root_rate) - rate * per_rate) * kept
@@ -928,8 +953,8 @@ def after_reset(
 
 
 @njit(inline="always")
-def needed(electrons: float, per_electron: float, kappa_squared: float, draw: float) -> float:
-    """The threshold [grains] whose charge is spread as that of so many electrons [thresholds] and the reset."""
+def next_threshold(electrons: float, per_electron: float, kappa_squared: float, draw: float) -> float:
+    """Threshold [grains] with the spread of so many electrons [thresholds] and of the reset."""
     return _G + _G * math.sqrt(max(electrons, 0.0) * per_electron + kappa_squared) * draw
 
 
@@ -954,6 +979,6 @@ def add(values: Bytes, out: Bytes) -> None:
 
 @njit(inline="always")
 def couple(kick: float, around: Bytes, charge: Floats) -> None:
-    """Charge [grains] with what the neighbours that fired couple in."""
+    """Add kicks of neighbours that fired to charge [grains]."""
     for j in range(charge.size):
         charge[j] = (charge[j] / _G + kick * around[j]) * _G

@@ -1,12 +1,12 @@
 """The fast engine's loop for light that is new in every frame, or every few: four frames at a time, without a root.
 
     x <- x - (F(k + 1) - F(k))              fires where x <= 0: then x <- x + charge of the next spike
-    F(1) = (i0 + i1) >> 1                   of an interval of one frame: what `loop.ramp_of` and `collected` come to
+    F(1) = (i0 + i1) >> 1                   of an interval of one frame, by `loop.ramp_of` and `collected`
 
 The bits are those of `loop.advance`, whose rows, hash and law these are.  The charge of a spike depends on its number
-alone, not on its time: so each pixel has a queue of its next charges, four at most.  A group of pixels draws one more
-each where the light of the next four frames takes one of them to the end of its queue; then all pixels pass the four
-frames by selects, without a branch.  In most groups one pixel fires in every frame: a draw for each such frame would be
+alone, not on its time: so each pixel has a queue of its next charges, four at most.  Where the light of the next four
+frames takes a pixel to the end of its queue, its group draws one more each.  Then all pixels pass the four frames by
+selects, without a branch.  In most groups one pixel fires in every frame: a draw for each such frame would be
 three times as many.  A tile in which a pixel may fire twice in a frame goes on frame by frame, as in `loop`.
 """
 
@@ -19,7 +19,7 @@ from numba.np.numpy_support import carray
 from numpy.typing import NDArray
 
 from spikecam_env.compiled import njit
-from spikecam_env.sensor.kernels.intrinsics import pointer_to, prefetch, take_ticket, use_widest_vectors
+from spikecam_env.sensor.compiled_tools.intrinsics import pointer_to, prefetch, take_ticket, use_widest_vectors
 from spikecam_env.sensor.kernels.loop import (
     BELL,
     CAP,
@@ -71,9 +71,8 @@ from spikecam_env.sensor.light import GRAINS
 AT_ONCE = 4
 """Frames at a time, and charges of each pixel that are ready."""
 
-LOOP = 0xBE0A1089
-"""Checksum of the file of `loop`, of which much is compiled in: numba's cache sees a change of this file, not of those
-it imports from."""
+LOOP = 0x6A460E5D
+"""Checksum of `loop.py`, compiled in: numba's cache sees a change of this file, not of those it imports from."""
 
 _U = np.uint32
 _I = np.int32
@@ -89,14 +88,18 @@ _SCRATCH = _CHARGE + AT_ONCE * TILE
 
 @njit(inline="always")
 def grains(light: Any, gain: Any, dark: Any) -> Any:
-    """Of a frame in this light."""
+    """Grains of a frame in this light."""
     return _I(min(light * gain + dark, CAP) + _F(0.5))
 
 
 @njit(inline="always")
 def is_chain(pieces: Any, k: Any, stop: Any, known: Any) -> Any:
-    """Whether the next AT_ONCE pieces are of one frame each, every one beginning in the light in which the one before
-    ended; known: address of the light of which row LEVEL is."""
+    """Whether the next AT_ONCE pieces are of one frame each and in a chain: each begins in the light of the last end.
+
+    Args:
+        stop: after the camera's last.
+        known: address of the light of row LEVEL.
+    """
     chain = k + AT_ONCE <= stop
     for piece in range(k, min(k + AT_ONCE, stop)):
         chain &= pieces[piece, LENGTH] == 1 and pieces[piece, LIGHT0] == known
@@ -129,8 +132,11 @@ def chain(s: Any, light1: Any, light2: Any, light3: Any, light4: Any, gain: Any,
 
 @njit(inline="always")
 def reach(s: Any) -> Any:
-    """Rows REACH, the charge that four frames leave of all that is ready, and LACKS, whether they leave none; returns
-    the most charge of a frame."""
+    """Rows REACH, the queued charge less that of four frames, and LACKS, whether none is left.
+
+    Returns:
+        The most charge of a frame.
+    """
     most = _I(0)
     for j in range(TILE):
         c0, c1, c2, c3 = s[_CHARGE + j], s[_CHARGE1 + j], s[_CHARGE2 + j], s[_CHARGE3 + j]
@@ -186,9 +192,12 @@ def fill(s: Any, f: Any, live: Any, groups: Any, polynomial: Any) -> Any:
 
 
 @njit(inline="always")
-def take(s: Any, bit: Any, word: Any) -> Any:
-    """Four frames of all pixels: rows X, TAKEN, SPIKES, and their bits from `bit` on of row `word`; whether no pixel
-    fired twice in a frame."""
+def pass_frames(s: Any, bit: Any, word: Any) -> Any:
+    """Pass four frames of all pixels: rows X, READY, SPIKES, and bits from `bit` on of row `word`.
+
+    Returns:
+        Whether no pixel fired twice in a frame.
+    """
     least = _I(1)
     for j in range(TILE):
         x = s[X + j]
@@ -232,8 +241,8 @@ def take(s: Any, bit: Any, word: Any) -> Any:
 
 
 @njit(inline="always")
-def take_back(s: Any, bit: Any, word: Any) -> None:
-    """Rows X, SPIKES and the bits as they were before `take`."""
+def undo_frames(s: Any, bit: Any, word: Any) -> None:
+    """Restore rows X, SPIKES and the bits from before `pass_frames`."""
     for j in range(TILE):
         s[X + j] = s[_BEFORE + j]
         bits = _I(s[word + j] >> bit)
@@ -257,7 +266,7 @@ def advance(
     dense: float,
     packed: bool,
 ) -> None:
-    """As `loop.advance`, with the same bits; of what is dense it makes no use."""
+    """As `loop.advance`, with the same bits; `dense` is not used."""
     use_widest_vectors()
     room = np.empty(_SCRATCH + 16, np.int32)
     begin = (-room.ctypes.data % 64) // 4
@@ -365,9 +374,9 @@ def advance(
                         groups = fill(s, f, live, groups, polynomial)
                     word = HIGH if done >= 32 else LOW
                     bit = _I(done & 31)
-                    calm = take(s, bit, word)
+                    calm = pass_frames(s, bit, word)
                     if not calm:
-                        take_back(s, bit, word)
+                        undo_frames(s, bit, word)
                 if not calm:
                     for u in range(min(AT_ONCE, frames - done)):
                         for j in range(TILE):

@@ -1,15 +1,16 @@
 """The fast engine: random numbers only per spike.
 
-Poisson arrivals of rate lambda(t) are a unit-rate process in Lambda(t) = integral of lambda, so a pixel that needs N
-electrons fires when Lambda has advanced by Gamma(N, 1), with the reset's draw mixed in (`quantile`).  Between spikes
-nothing is drawn: the crossing time follows from the light ramp (`loop`).  Without noise the bits are the reference's.
+Poisson arrivals of rate lambda(t) are a unit-rate process in Lambda(t) = integral of lambda.  A pixel that needs N
+electrons therefore fires when Lambda has advanced by Gamma(N, 1), with the reset's draw mixed in (`quantile`).
+Between spikes nothing is drawn: the crossing time follows from the light ramp (`loop`).  Without noise the bits are
+the reference's.
 
 The number of threads (`threads`) changes no bit.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, fields
 from functools import cached_property, partial
 from typing import Any, NamedTuple
@@ -17,29 +18,44 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from spikecam_env.compiled import njit
+from spikecam_env.sensor.compiled_tools.intrinsics import address_of
+from spikecam_env.sensor.compiled_tools.quantile import MIN_ELECTRONS, fitted_polynomial
 from spikecam_env.sensor.effects import Effect
+from spikecam_env.sensor.imaging import Imaging
 from spikecam_env.sensor.kernels import every_frame, loop
-from spikecam_env.sensor.kernels.intrinsics import address_of
-from spikecam_env.sensor.kernels.quantile import MIN_ELECTRONS, fitted_polynomial
-from spikecam_env.sensor.light import GRAINS, Segment
+from spikecam_env.sensor.light import (
+    COUNT,
+    FIRST,
+    GRAINS,
+    KEY0,
+    KEY1,
+    LENGTH,
+    MAX_SEGMENT,
+    Keyframes,
+    Segment,
+    cuts,
+    segments,
+)
 from spikecam_env.sensor.model import generator
 from spikecam_env.sensor.unit import Unit
 from spikecam_env.threads import as_many_as_pay, together
+from spikecam_env.types import Floats, Pictures, Spikes
 
 DENSE = 0.7
-"""Spikes a pixel and frame from which on streaming frame by frame is faster than jumping."""
+"""Spikes a pixel and frame above which streaming frame by frame is faster than jumping."""
 
 OFTEN = 4.0
-"""Frames a key interval, on average over a stretch, below which to go frame by frame is faster than from spike to spike
-(`every_frame`): 1.6 times at 2 frames, 1.0 to 1.2 at 4, 0.8 to 1.1 at 8, at mean intervals of 3 to 100 frames."""
+"""Mean frames a key interval of a stretch, below which `every_frame` is faster than going from spike to spike: 1.6
+times at 2 frames, 1.0 to 1.2 at 4, 0.8 to 1.1 at 8, at mean intervals of 3 to 100 frames."""
 
 FEWEST = MIN_ELECTRONS / 2
-"""Electrons to a threshold, at least, of which a spike's noise is drawn.  The law's shape is that of the median pixel:
-with the noise of fewer electrons, in the tail of a spread, it would reach below zero charge."""
+"""Fewest electrons to a threshold for a spike's noise.  The law's shape is that of the median pixel: with the noise of
+fewer electrons, in the tail of a spread, it would reach below zero charge."""
 
 
 def missing(effects: Sequence[Effect]) -> list[str]:
-    """Names of effects, or options of them, that this engine does not carry: all that do something a frame."""
+    """Names of effects, or options of them, that this engine does not carry: all that act from frame to frame."""
     names = [e.name for e in effects if not e.is_fixed()]
     names += ["shot_noise.dark_is_noisy=false" for e in effects if getattr(e, "dark_is_noisy", True) is False]
     quanta = [getattr(e, "quanta", MIN_ELECTRONS) for e in effects]
@@ -48,15 +64,16 @@ def missing(effects: Sequence[Effect]) -> list[str]:
 
 @dataclass(frozen=True)
 class PixelLaw:
-    """A unit in the loop's numbers: float32, padded to whole tiles.
+    """A unit in the loop's numbers, padded to whole tiles."""
 
-    gain, dark [grains/frame]; spread [grains], standard deviation of a spike's charge; polynomial: its law's shape.
-    """
-
-    gain: NDArray[np.float32]
-    dark: NDArray[np.float32]
-    spread: NDArray[np.float32]
+    gain: Pictures
+    """[grains/frame]."""
+    dark: Pictures
+    """[grains/frame]."""
+    spread: Pictures
+    """Standard deviation of a spike's charge [grains]."""
     polynomial: tuple[np.float32, ...]
+    """Shape of its law."""
 
     @classmethod
     def of(cls, unit: Unit) -> PixelLaw:
@@ -69,49 +86,52 @@ class PixelLaw:
         return self  # never written to
 
 
-def per_electron(unit: Unit) -> NDArray[np.float64]:
+def per_electron(unit: Unit) -> Floats:
     """1/N of every pixel (P,), 0 without shot noise; N no less than FEWEST."""
     return 1.0 / np.maximum(unit.electrons, FEWEST) if unit.shot else np.zeros(unit.electrons.size)
 
 
 @dataclass
 class FastState:
-    """Pixels mid-stream, padded to whole tiles.
-
-    remaining: int32 grains to the next spike.  fired: uint32 spikes so far.
-    seeds: the two words that, with a pixel's number and its spike's, fix every draw.
-    What is written is written into these arrays: others do not take their place.
-    """
+    """Pixels mid-stream, padded to whole tiles; its arrays are changed in place, never replaced."""
 
     law: PixelLaw
     remaining: NDArray[np.int32]
+    """Grains to the next spike."""
     fired: NDArray[np.uint32]
+    """Spikes so far."""
     seeds: tuple[np.uint32, np.uint32]
+    """With the numbers of a pixel and of its spike they fix every draw."""
 
     @cached_property
-    def where(self) -> Where:
-        """Where the arrays are in memory; a copy's are elsewhere."""
+    def addresses(self) -> Addresses:
+        """Addresses of the arrays in memory; a copy has others."""
         polynomial = np.array(self.law.polynomial, np.float32)
         arrays = self.law.gain, self.law.dark, self.law.spread, polynomial, self.remaining, self.fired
-        return Where(tuple(map(address_of, arrays)), (int(self.seeds[0]), int(self.seeds[1])), polynomial)
+        return Addresses(tuple(map(address_of, arrays)), (int(self.seeds[0]), int(self.seeds[1])), polynomial)
 
     def __getstate__(self) -> dict[str, Any]:
         return {f.name: getattr(self, f.name) for f in fields(self)}
 
 
-class Where(NamedTuple):
-    """addresses: of a camera's arrays, in the order of `loop.advance`; then its seed's words.  polynomial: one of the
-    arrays, which nobody else holds."""
+class Addresses(NamedTuple):
+    """A camera in the table of `loop.advance`."""
 
-    addresses: tuple[int, ...]
+    arrays: tuple[int, ...]
+    """In its order."""
     words: tuple[int, int]
-    polynomial: NDArray[np.float32]
+    """Of the seed."""
+    polynomial: Pictures
+    """One of the arrays, kept alive here."""
 
 
-def start(unit: Unit, phase: NDArray[np.float64], seed: int) -> FastState:
-    """Pixels part-way through a cycle: phase (P,) in [0, 1) is the share of the nominal threshold collected.
+def start(unit: Unit, phase: Floats, seed: int) -> FastState:
+    """Pixels part-way through a cycle.
 
     The first spike's charge is drawn literally: threshold, whole electrons still missing, their Gamma waiting charge.
+
+    Args:
+        phase: (P,) in [0, 1), share of the nominal threshold collected.
     """
     rng = generator(seed, "fast engine: first spike")
     missing_grains = GRAINS * (1.0 + unit.kappa * rng.standard_normal(phase.size)) - np.floor(phase * GRAINS)
@@ -125,12 +145,15 @@ def start(unit: Unit, phase: NDArray[np.float64], seed: int) -> FastState:
     return FastState(PixelLaw.of(unit), _padded(remaining, GRAINS), _padded(fired), (words[0], words[1]))
 
 
-def run(
-    state: FastState, segment: Segment, out: NDArray[np.uint8] | None = None, *, threads: int | None = None
-) -> NDArray[np.uint8]:
-    """Advance `state` over a segment; returns spikes (count, P) uint8, 0 or 1, in `out` where that is given.
+def run(state: FastState, segment: Segment, out: Spikes | None = None, *, threads: int | None = None) -> Spikes:
+    """Advance `state` over a segment.
 
-    out: (count, P) uint8, C-contiguous.  threads: default NUMBA_NUM_THREADS.
+    Args:
+        out: (count, P) uint8, C-contiguous, for the spikes.
+        threads: default NUMBA_NUM_THREADS.
+
+    Returns:
+        Spikes (count, P) uint8, 0 or 1, in `out` where that is given.
     """
     if out is None:
         out = np.empty((segment.count, segment.radiance0.size), dtype=np.uint8)
@@ -146,56 +169,51 @@ def run_packed(state: FastState, segment: Segment, *, threads: int | None = None
 
 
 class Stretch(NamedTuple):
-    """Frames, MAX_SEGMENT at most, that one camera is to be advanced over.
-
-    pieces: (S, PIECE_COLUMNS) int64, addresses of light and frames of key intervals, see `loop.advance`.
-    light: the arrays at those addresses.  out: (frames, P) uint8, C-contiguous, where spikes go.  pixels: P.
-    """
+    """Frames of one camera for a call of a kernel, MAX_SEGMENT at most."""
 
     state: FastState
     pieces: NDArray[np.int64]
-    light: Sequence[NDArray[np.float32]]
-    out: NDArray[np.uint8]
+    """(S, PIECE_COLUMNS), addresses of light and frames of key intervals, see `loop.advance`."""
+    light: Sequence[Pictures]
+    """The arrays at those addresses."""
+    out: Spikes
+    """(frames, P), C-contiguous, overwritten."""
     pixels: int
+    """P."""
 
     @property
     def changes_often(self) -> bool:
-        """Whether its light does, so that it is advanced frame by frame (`every_frame`)."""
+        """Whether its light changes often, so that `every_frame` is faster."""
         frames = len(self.out)
         return frames >= every_frame.AT_ONCE and frames < OFTEN * len(self.pieces)
 
     @classmethod
-    def of(cls, state: FastState, segments: Sequence[Segment], out: NDArray[np.uint8]) -> Stretch:
-        """Over segments that follow one another."""
-        light = [np.ascontiguousarray(end) for each in segments for end in (each.radiance0, each.radiance1)]
+    def of(cls, state: FastState, segments: Sequence[Segment], out: Spikes) -> Stretch:
+        """The stretch of segments that follow one another."""
+        light = [np.ascontiguousarray(end) for one in segments for end in (one.radiance0, one.radiance1)]
         pieces = [
-            (address_of(low), address_of(high), each.length, each.first, each.count)
-            for each, low, high in zip(segments, light[::2], light[1::2], strict=True)
+            (address_of(low), address_of(high), one.length, one.first, one.count)
+            for one, low, high in zip(segments, light[::2], light[1::2], strict=True)
         ]
         return cls(state, np.array(pieces, np.int64), light, out, segments[0].radiance0.size)
 
 
 def run_together(stretches: Sequence[Stretch], *, threads: int | None = None) -> None:
-    """Advance cameras, each over its stretch, in one compiled call a thread: spikes go where each says.
-
-    threads: default NUMBA_NUM_THREADS.
-    """
-    whole = [one.out if one.pixels % 8 == 0 else _wide(one) for one in stretches]
+    """Advance cameras, each over its stretch, in one compiled call a thread (default NUMBA_NUM_THREADS)."""
+    whole = [  # whole words of pixels
+        one.out if one.pixels % 8 == 0 else np.empty((len(one.out), one.pixels + -one.pixels % 8), dtype=np.uint8)
+        for one in stretches
+    ]
     _advance(stretches, whole, False, threads)
     for one, spikes in zip(stretches, whole, strict=True):
         if spikes is not one.out:
             one.out[:] = spikes[:, : one.pixels]
 
 
-def _wide(one: Stretch) -> NDArray[np.uint8]:
-    """Room for whole words of pixels."""
-    return np.empty((len(one.out), one.pixels + -one.pixels % 8), dtype=np.uint8)
-
-
 def _advance(
     stretches: Sequence[Stretch], outs: Sequence[NDArray[np.uint8]], packed: bool, threads: int | None
 ) -> None:
-    """outs: where the spikes of each go, as bits or as bytes (`loop.advance`)."""
+    """Advance cameras; outs: spikes of each as bits or as bytes (`loop.advance`)."""
     jobs = list(zip(stretches, outs, strict=True))
     for often in (False, True):
         of_kind = [job for job in jobs if job[0].changes_often is often]
@@ -208,8 +226,8 @@ def _share(jobs: Sequence[tuple[Stretch, NDArray[np.uint8]]], often: bool, packe
     cameras, bands, done = [], [], 0
     for number, (one, out) in enumerate(jobs):
         pieces = done, done + len(one.pieces)
-        where = one.state.where
-        cameras.append((*where.addresses, address_of(out), *where.words, one.pixels, len(out), *pieces))
+        table = one.state.addresses
+        cameras.append((*table.arrays, address_of(out), *table.words, one.pixels, len(out), *pieces))
         bands += [(number, band) for band in range(-(-one.state.remaining.size // loop.WIDTH))]
         done = pieces[1]
     steps = sum(one.pixels * len(out) for one, out in jobs)
@@ -228,7 +246,67 @@ def _share(jobs: Sequence[tuple[Stretch, NDArray[np.uint8]]], often: bool, packe
     together([partial(advance, worker, *work) for worker in range(count)], shared=True)
 
 
-def unpack(packed: NDArray[np.uint8], pixels: int, out: NDArray[np.uint8] | None = None) -> NDArray[np.uint8]:
+def stretches(
+    state: FastState, light: Keyframes | Pictures, start: int, imaging: Imaging, spikes: Spikes
+) -> Iterator[Stretch]:
+    """The frames from `start` on, as many as there are in spikes (frames, P), through the optics."""
+    if isinstance(light, Keyframes) and not imaging:
+        rows = cuts(light.frame, start, start + len(spikes))
+        pieces = _at_keys(rows, address_of(light.radiance), light.radiance.strides[0])
+        if len(pieces):
+            return _key_stretches(state, light.radiance, pieces, spikes)
+    return _segment_stretches(state, map(imaging.segment_image, segments(light, start, len(spikes))), spikes)
+
+
+def _key_stretches(
+    state: FastState, radiance: Pictures, pieces: NDArray[np.int64], spikes: Spikes
+) -> Iterator[Stretch]:
+    """Stretches between keys at whole frames, whose pictures are not copied."""
+    if len(spikes) <= MAX_SEGMENT:
+        yield Stretch(state, pieces, (radiance,), spikes, spikes.shape[1])
+        return
+    ends = np.cumsum(pieces[:, loop.COUNT])
+    first = done = 0
+    while first < len(pieces):
+        after = int(np.searchsorted(ends, done + MAX_SEGMENT, side="right"))
+        stop = int(ends[after - 1])
+        yield Stretch(state, pieces[first:after], (radiance,), spikes[done:stop], spikes.shape[1])
+        first, done = after, stop
+
+
+@njit(cache=True, nogil=True)
+def _at_keys(rows: NDArray[np.int64], address: int, size: int) -> NDArray[np.int64]:
+    """Rows of `cuts` as pieces of `loop.advance`; none where a row needs a picture that is no key's.
+
+    Args:
+        address: of the first key's picture.
+        size: bytes from one picture to the next.
+    """
+    pieces = np.empty((len(rows), loop.PIECE_COLUMNS), np.int64)
+    for k in range(len(rows)):
+        if rows[k, KEY0] < 0 or rows[k, KEY1] < 0:
+            return pieces[:0]
+        pieces[k, loop.LIGHT0] = address + rows[k, KEY0] * size
+        pieces[k, loop.LIGHT1] = address + rows[k, KEY1] * size
+        pieces[k, loop.LENGTH], pieces[k, loop.FIRST] = rows[k, LENGTH], rows[k, FIRST]
+        pieces[k, loop.COUNT] = rows[k, COUNT]
+    return pieces
+
+
+def _segment_stretches(state: FastState, segments: Iterator[Segment], spikes: Spikes) -> Iterator[Stretch]:
+    """Stretches of pictures that are computed one after another."""
+    waiting: list[Segment] = []
+    done = frames = 0
+    for segment in segments:
+        if frames + segment.count > MAX_SEGMENT:
+            yield Stretch.of(state, waiting, spikes[done : done + frames])
+            waiting, done, frames = [], done + frames, 0
+        waiting.append(segment)
+        frames += segment.count
+    yield Stretch.of(state, waiting, spikes[done : done + frames])
+
+
+def unpack(packed: NDArray[np.uint8], pixels: int, out: Spikes | None = None) -> NDArray[np.uint8]:
     """Bits (count, ceil(pixels/8)) to spikes (count, pixels) uint8, in `out` where that is given."""
     if out is None:
         out = np.empty((len(packed), pixels), dtype=np.uint8)
@@ -241,14 +319,10 @@ def unpack(packed: NDArray[np.uint8], pixels: int, out: NDArray[np.uint8] | None
 
 
 def _shape_of_law(unit: Unit) -> tuple[np.float32, ...]:
-    kappa = _rounded(float(np.median(unit.kappa)))
-    electrons = _rounded(float(np.median(unit.electrons))) if unit.shot else np.inf
+    """The fit at the median pixel, rounded to three digits, so that cameras of one model share it."""
+    kappa = float(f"{np.median(unit.kappa):.3g}")
+    electrons = float(f"{np.median(unit.electrons):.3g}") if unit.shot else np.inf
     return fitted_polynomial(electrons, kappa)
-
-
-def _rounded(value: float) -> float:
-    """To three digits, so that cameras of one model share a fit."""
-    return float(f"{value:.3g}")
 
 
 def _padded(values: NDArray[Any], fill: int = 0) -> NDArray[Any]:
@@ -257,7 +331,7 @@ def _padded(values: NDArray[Any], fill: int = 0) -> NDArray[Any]:
     return padded
 
 
-def compilable(radiance: NDArray[np.float32]) -> NDArray[np.float32]:
-    """A read-only or strided array would be compiled for anew: seconds, against microseconds for a copy."""
+def compilable(radiance: Pictures) -> Pictures:
+    """The array, or a copy of a read-only or strided one: microseconds, where compiling for it takes seconds."""
     plain = radiance.flags.c_contiguous and radiance.flags.writeable
     return radiance if plain else radiance.copy()

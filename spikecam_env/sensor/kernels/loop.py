@@ -6,16 +6,15 @@
 
 Jumping, k is the root of the quadratic in float32, rounded; the integers then decide on which side of it the crossing
 lies, so the bits are those of the frame-by-frame sum.  Streaming (`dense`), one frame at a time is compared: cheaper
-where most pixels fire in most frames, and where one frame is all that is asked for.  z is a polynomial (`quantile`) of
+where most pixels fire in most frames, and for a single frame.  z is a polynomial (`quantile`) of
 a sum of eight bytes hashed from (seed, pixel, spike number): no generator has a state, so neither chunks nor threads,
 nor the choice between the two, change a draw.
 
-Spikes are served in rounds, one for each pixel that still has one to come, and a round in short stages over the groups
-of pixels that are live, with results in a tile's scratch: a processor looks some hundred instructions ahead, and finds
-more to do at once in many short chains than in a few long ones (a third faster).
+Spikes are served in rounds, one spike of each pixel that has one to come.  A round is short stages over the live groups
+of pixels, with results in a tile's scratch.  A processor looks some hundred instructions ahead, and finds more to do at
+once in many short chains than in a few long ones (a third faster).
 
-Numba widens uint32 * uint32 to uint64: every operation is cast back.  No fastmath: bits must not depend on the machine.
-The law is in one file, because numba's cache looks only at the file of the function it compiles.
+No fastmath: bits must not depend on the machine.
 """
 
 from __future__ import annotations
@@ -27,8 +26,12 @@ from numba.np.numpy_support import carray
 from numpy.typing import NDArray
 
 from spikecam_env.compiled import njit
-from spikecam_env.sensor.kernels.intrinsics import pointer_to, take_ticket, use_widest_vectors
+from spikecam_env.sensor.compiled_tools.draws import GOLDEN, bell_of, first_key, scramble, second_key
+from spikecam_env.sensor.compiled_tools.intrinsics import pointer_to, take_ticket, use_widest_vectors
 from spikecam_env.sensor.light import GRAINS, MAX_GRAINS_PER_FRAME, MAX_SEGMENT
+
+DRAWS = 0x98AA1746
+"""Checksum of the draws compiled in: numba's cache sees a change of this file, not of those it imports from."""
 
 TILE = 256
 """Pixels worked on between reading and writing memory; state arrays are padded to whole tiles."""
@@ -52,60 +55,12 @@ _LEAST = _F(1.0)  # grain to the next spike: no draw takes a pixel back in time
 CAP = _F(MAX_GRAINS_PER_FRAME)
 _LONGEST = _F(MAX_SEGMENT)
 GOLDEN_SIGNED = _I(0x9E3779B9 - (1 << 32))
-GOLDEN = _U(0x9E3779B9)  # 2^32 / golden ratio: the counter's step from spike to spike
 
 # Rows of a tile's scratch array: one array with fixed offsets, so that LLVM can prove that rows do not overlap.
 LEVEL, CURVE, REST, X, END, COUNTER, KEY, SPREAD = (r * TILE for r in range(8))
 SPIKES, LOW, HIGH, FRAME, DRAW, WORD, BELL = (r * TILE for r in range(8, 15))
 SCRATCH = 15 * TILE
-INSIDE = TILE - 1  # a group's start masked with it is plainly not negative: numba then leaves wrapping indices out
-
-
-@njit(inline="always")
-def scramble(x: Any) -> Any:
-    """32-bit integer hash, a bijection: xor-shift-multiply with the `lowbias32` constants 21f0aaad, 735a2d97."""
-    x = _U(x ^ (x >> _U(16)))
-    x = _U(x * _U(0x21F0AAAD))
-    x = _U(x ^ (x >> _U(15)))
-    x = _U(x * _U(0x735A2D97))
-    return _U(x ^ (x >> _U(15)))
-
-
-@njit(inline="always")
-def first_key(pixel: Any, seed_low: Any) -> Any:
-    """Start of a pixel's counter."""
-    return scramble(_U(_U(pixel) ^ seed_low))
-
-
-@njit(inline="always")
-def second_key(key: Any, seed_high: Any) -> Any:
-    """Keeps pixels apart whose counters overlap."""
-    return scramble(_U(_U(key + seed_high) ^ _U(0xA511E9B3)))
-
-
-@njit(inline="always")
-def byte_sum(a: Any, b: Any) -> Any:
-    """Sum of the eight bytes of two words."""
-    pairs = _U(0x00FF00FF)
-    t = _U(_U(_U(a & pairs) + _U(_U(a >> _U(8)) & pairs)) + _U(_U(b & pairs) + _U(_U(b >> _U(8)) & pairs)))
-    return _U(_U(t & _U(0xFFFF)) + _U(t >> _U(16)))
-
-
-@njit(inline="always")
-def bell(counter: Any, key: Any) -> Any:
-    """A draw in (-4, 4) from a counter and a key of the pixel's own."""
-    word1 = scramble(counter)
-    return bell_of(word1, scramble(_U(word1 ^ key)))
-
-
-@njit(inline="always")
-def bell_of(word1: Any, word2: Any) -> Any:
-    """Eight uniform bytes, summed, over 256, less 4; a ninth byte fills the step between two sums.
-
-    The bytes are those of word2 and word1 + word2, independent: word1 is uniform whatever word2, keyed apart, is.
-    """
-    fine = _I(_U(_U(byte_sum(word2, _U(word1 + word2)) << _U(8)) | _U(word1 >> _U(24))))
-    return _F(fine) * _F(1 / 65536) + _F(0.5 / 65536 + 3.5 / 256 - 4.0)
+INSIDE = TILE - 1  # masks a group's start: not negative, so that numba leaves wrapping indices out
 
 
 @njit(inline="always")
@@ -250,9 +205,10 @@ def reset(s: Any, j: Any, active: Any, charge: Any, low: Any, high: Any) -> Any:
 
 @njit(inline="always")
 def jump(s: Any, f: Any, live: Any, groups: Any, polynomial: Any, first: Any) -> Any:
-    """Let each live pixel fire in the frame that its light says; returns how many groups stay live.
+    """Let each live pixel fire in the frame of its crossing; returns how many groups stay live.
 
-    first: frame of the key interval that bit 0 stands for.
+    Args:
+        first: frame of the key interval of bit 0.
     """
     for i in range(groups):
         q = live[i] & INSIDE
@@ -282,7 +238,7 @@ def jump(s: Any, f: Any, live: Any, groups: Any, polynomial: Any, first: Any) ->
 
 @njit(inline="always")
 def stream(s: Any, f: Any, live: Any, groups: Any, polynomial: Any, at: Any) -> Any:
-    """As `jump`, where every live pixel fires in the frame that bit `at` stands for."""
+    """As `jump`, where every live pixel fires in the frame of bit `at`."""
     bit = _I(_I(1) << _I(at & _I(31)))
     low = _I(bit * _I(at < _I(32)))
     high = _I(bit * _I(at >= _I(32)))
@@ -301,7 +257,7 @@ def stream(s: Any, f: Any, live: Any, groups: Any, polynomial: Any, at: Any) -> 
 
 @njit(inline="always")
 def write_bits(eights: Any, start: Any, words: Any, out: Any) -> None:
-    """A band's planes, each a byte a pixel that holds its eight frames, to frames of bits (F, ceil(P/8)) uint8."""
+    """Planes of a band, a byte of eight frames for each pixel, to frames of bits (F, ceil(P/8)) uint8."""
     for plane in range((out.shape[0] + 7) // 8):
         of_plane = eights[plane * (WIDTH // 8) : plane * (WIDTH // 8) + words]
         transpose_bits(of_plane)
@@ -344,21 +300,23 @@ def advance(
     dense: float,
     packed: bool,
 ) -> None:
-    """Frames of one or more cameras, for the bands of tiles that this thread gets hold of.
+    """Advance one or more cameras, for the bands of tiles that this thread gets hold of.
 
-    worker: which of the threads at work this is.  tickets: int64 (threads, 8), shared: in [:, 0] the next band of each
-        one's share.  Who is through with his own takes others'.
-    cameras: int64 (C, CAMERA_COLUMNS).  Addresses of
-        gain, dark: float32 [grains/frame]; spread: float32 [grains]; polynomial: 8 float32;
-        remaining: int32 [grains] and fired: uint32, updated; these but the polynomial are padded to whole tiles;
-        out: see `packed`, overwritten.
-        Then the seed's two words, pixels P, frames F (at most MAX_SEGMENT), and which pieces are the camera's.
-    bands: int32 (B, 2), every camera's bands: the camera, and which of its bands.
-    pieces: int64 (S, PIECE_COLUMNS), those of a camera one after another, F frames together: addresses of the light at
-        the start and at the end of a key interval, (P,) float32 each, its length, and which of its frames: from, count.
-    dense: expected spikes a pixel and frame from which on a tile is streamed.
-    packed: out is uint8 (F, ceil(P/8)), pixel p is bit p % 8 of byte p // 8; or else
-        uint64 (F, ceil(P/8)), pixel p is byte p % 8 of word p // 8, 0 or 1.
+    Args:
+        worker: number of this thread.
+        tickets: int64 (threads, 8), shared: in [:, 0] the next band of each one's share.  A thread that has finished
+            its own takes those of others.
+        cameras: int64 (C, CAMERA_COLUMNS).  Addresses of gain, dark: float32 [grains/frame]; spread: float32 [grains];
+            polynomial: 8 float32; remaining: int32 [grains] and fired: uint32, updated; out, overwritten.  All but
+            polynomial and out are padded to whole tiles.  Then the seed's two words, pixels P, frames F (at most
+            MAX_SEGMENT), and the first piece of the camera and the piece after its last.
+        bands: int32 (B, 2), every camera's bands: the camera, and which of its bands.
+        pieces: int64 (S, PIECE_COLUMNS), those of a camera one after another, F frames together: addresses of the
+            light at the start and at the end of a key interval, (P,) float32 each, its length, and which of its frames:
+            from, count.
+        dense: expected spikes a pixel and frame above which a tile is streamed.
+        packed: out is uint8 (F, ceil(P/8)), pixel p is bit p % 8 of byte p // 8; or else uint64 (F, ceil(P/8)), pixel p
+            is byte p % 8 of word p // 8, 0 or 1.
     """
     use_widest_vectors()
     s = np.empty(SCRATCH, np.int32)

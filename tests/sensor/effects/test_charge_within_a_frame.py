@@ -1,4 +1,4 @@
-"""What changes within a frame is integrated over it: each effect on charge against a fine integration in time.
+"""Changes within a frame are integrated over it: each effect on charge against a fine integration in time.
 
 The integration is of its own: a thousand instants a frame, in light that is linear between whole frames.
 """
@@ -45,7 +45,7 @@ def line_rises(of_time: np.ndarray) -> np.ndarray:
 
 
 def collected(effect, cuts: tuple[int, ...] = (FRAMES,), dark: float = 0.0) -> tuple[np.ndarray, ...]:
-    """Three (FRAMES, 3): what the effect makes of that light, of a steady dark charge, and the light's rise."""
+    """Three (FRAMES, 3): that light after the effect, a steady dark charge after it, and the light's rise."""
     at_ends = ends()
     x, d = (at_ends[1:] + at_ends[:-1]) / 2, np.diff(at_ends, axis=0)
     memory = effect.begin(FIRST, np.random.default_rng(1), np.random.default_rng(2))
@@ -144,7 +144,8 @@ def test_lamp_drift_is_the_mean_of_its_walk() -> None:
     effect = CATALOGUE["lamp_drift"](sigma_per_root_s=sigma * np.sqrt(RATE_HZ))
     now = replace(FIRST, frames=frames)
     memory = effect.begin(now, np.random.default_rng(1), np.random.default_rng(2))
-    light, _, _ = effect.collect(Charge(np.ones((1, 1, 3))), Charge(np.zeros((1, 1, 3))), now, memory)
+    light, dark, _ = effect.collect(Charge(np.ones((1, 1, 3))), Charge(np.zeros((1, 1, 3))), now, memory)
+    assert not dark.values.any()
     steps = np.diff(np.broadcast_to(light.values, (frames, 1, 3))[:, 0, 0]) / sigma
     check("variance of a step", steps.var(), 2 / 3, 4.5 * (2 / 3) * np.sqrt(2.5 / frames))
     check("lag 1", (steps[1:] * steps[:-1]).mean(), 1 / 6, 4.5 * (2 / 3) / np.sqrt(frames))

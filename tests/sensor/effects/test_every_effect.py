@@ -1,4 +1,4 @@
-"""What every effect of the catalogue owes, by its declaration alone."""
+"""Duties of every effect of the catalogue, by its declaration alone."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import importlib
 import math
 import pickle
 import re
-from dataclasses import fields, replace
+from dataclasses import fields
 from pathlib import Path
 
 import numpy as np
@@ -16,7 +16,7 @@ from laws import camera, population, with_effects
 from spikecam_env.errors import InputError
 from spikecam_env.sensor import CATALOGUE, Keyframes, SensorModel, SpikeSensor
 from spikecam_env.sensor.effect_sheet import SECTIONS, Sheet
-from spikecam_env.sensor.effects.base import Charge, ExposureBlock, Few
+from spikecam_env.sensor.effects.base import Charge, Few
 from spikecam_env.sensor.kernels import block
 from tools import effects_page
 
@@ -95,52 +95,7 @@ def test_strong_effect_changes_bits_the_same_however_cut_saved_and_restored(name
     np.testing.assert_array_equal(sensor.step(light, FRAMES), whole)
 
 
-def frozen(memory):
-    """The same, its arrays read-only."""
-    for part in memory if isinstance(memory, tuple) else (memory,):
-        if isinstance(part, tuple):
-            frozen(part)
-        elif isinstance(part, Charge):
-            frozen((part.pixels, part.factor))
-        elif isinstance(part, np.ndarray):
-            part.flags.writeable = False
-    return memory
-
-
-def fits(array: np.ndarray, shape: tuple[int, ...]) -> bool:
-    return np.broadcast_shapes(np.shape(array), shape) == shape
-
-
-@pytest.mark.parametrize("name", [n for n in EVERY if not CATALOGUE[n].is_fixed()])
-def test_hooks_change_nothing_in_place_and_keep_shapes(name: str) -> None:
-    effect, rng = strong(name), np.random.default_rng(0)
-    first = ExposureBlock(0, 40_000.0, SHAPE, SensorModel.preset("scsim").draw_unit(SHAPE, 0))
-    memory = frozen(effect.begin(first, np.random.default_rng(1), np.random.default_rng(2)))
-    number = 0
-    for frames in (1, 1, 4, 1, 7):
-        now, whole = replace(first, number=number, frames=frames), (frames, *SHAPE)
-        light, dark = (frozen(Charge(rng.random(whole), rng.random((frames, 1, 1)))) for _ in range(2))
-        spikes = frozen(rng.random(whole) < 0.3)
-        *charges, memory = effect.collect(light, dark, now, frozen(memory))
-        shift, memory = effect.compare(now, frozen(memory))
-        sway = effect.sway(now, *(frozen(rng.random((SHAPE[0], 5))) for _ in range(2)))
-        read, memory = effect.read_out(spikes, now, frozen(memory))
-        assert all(c.values.shape == whole and c.values.dtype == np.float64 for c in charges)
-        assert fits(shift.factor, (frames, SHAPE[0], 1)) and fits(shift.millivolts, whole)
-        assert all(fits(wave, (frames, SHAPE[0], 5)) for wave in (sway.factor, sway.millivolts))
-        assert read.shape == whole and read.dtype == np.bool_
-        for i in range(frames):
-            one, fired = replace(now, number=number + i, frames=1), spikes[i]
-            threshold, charge, rate = frozen(tuple(rng.random((3, *SHAPE))))
-            limit = effect.react(threshold, one, frozen(memory))
-            residual = effect.after_reset(frozen(charge[fired]), frozen(rate[fired]), one)
-            left, memory = effect.spiked(charge, fired, rate, one, frozen(memory))
-            assert all(a.shape == SHAPE and a.dtype == np.float64 for a in (limit, left))
-            assert residual.shape == (fired.sum(),)
-        number += frames
-
-
-def test_what_a_few_pixels_get_is_as_if_all_were_written_out() -> None:
+def test_charge_of_a_few_pixels_is_as_if_all_were_written_out() -> None:
     """Beside charge that stays it is kept apart; beside charge that moves, or that others get too, it is added."""
     rng, frames = np.random.default_rng(0), 3
     still, moving = rng.random((1, *SHAPE)), rng.random((frames, *SHAPE))
@@ -154,14 +109,6 @@ def test_what_a_few_pixels_get_is_as_if_all_were_written_out() -> None:
     assert np.array_equal(apart.plus(few).values, still + besides + besides)
     assert np.array_equal(Charge(moving).plus(few).values, moving + besides)
     assert np.array_equal(Charge(still, factor).plus(few).values, still * factor + besides)
-
-
-def test_state_of_a_model_with_other_effects_is_refused() -> None:
-    state = camera("crosstalk", SHAPE, engine="reference").state()
-    with pytest.raises(InputError, match=r"other frame effects \(crosstalk\); this one has dead_time"):
-        camera("dead_time", SHAPE, engine="reference").restore(state)
-    with pytest.raises(InputError, match="this one has none"):
-        SpikeSensor("ideal", SHAPE, engine="reference").restore(state)
 
 
 def test_all_effects_at_once_are_one_stream_however_cut() -> None:
@@ -188,13 +135,6 @@ def test_fast_engine_gives_the_bits_of_the_reference_without_noise(name: str, li
     np.testing.assert_array_equal(fast, reference)
 
 
-def test_clean_twin_has_no_effects() -> None:
-    sensor = SpikeSensor(with_effects("scsim", *(e() for e in CATALOGUE.values())), SHAPE, 4, "auto")
-    assert sensor.clean_twin().model.effects == ()
-    ideal = SpikeSensor("ideal", SHAPE, 4, "reference").step(moving_light(), FRAMES)
-    np.testing.assert_array_equal(sensor.clean_twin().step(moving_light(), FRAMES), ideal)
-
-
 @pytest.mark.parametrize("name", EVERY)
 def test_is_documented(name: str) -> None:
     effect = CATALOGUE[name]
@@ -206,19 +146,6 @@ def test_is_documented(name: str) -> None:
     assert sheet.sections.get("Within a frame", "").startswith(effect.acts.value)
     if "Twins" in sheet.sections:
         assert sheet.twins and name not in sheet.twins
-
-
-@pytest.mark.parametrize("name", EVERY)
-def test_is_bounded(name: str) -> None:
-    effect = CATALOGUE[name]
-    bounds = {f.name: f.metadata["bounds"] for f in fields(effect) if f.metadata["bounds"]}
-    low, high = bounds[effect.strength]
-    assert low <= effect.neutral <= high
-    for parameter, (low, high) in bounds.items():
-        for bad in (low - 1, high + 1, float("nan"), "much"):
-            if bad != math.inf:
-                with pytest.raises(InputError, match=f"{name}.{parameter}"):
-                    effect(**{parameter: bad})
 
 
 @pytest.mark.parametrize("name, parameter", [("afterpulsing", "delay_frames"), ("threshold_flicker_noise", "octaves")])

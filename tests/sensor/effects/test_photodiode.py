@@ -79,7 +79,7 @@ def test_photodiode_lag_follows_a_step_with_part_of_the_light_late() -> None:
     worst = np.abs(rate - expected).max()
     print(f"first frame {rate[0]:.4f} of {x}, worst {worst:.2g}")
     assert worst < 4.5 * 0.5 / np.sqrt(pixels)
-    # The dark after it gives back what was late: f tau in all, less nothing.
+    # The dark after it gives back the late charge: f tau in all.
     after = population(sensor, 0.0, 200).sum()
     check("late charge", after, x * f * tau * (1 - np.exp(-60 / tau)), 4.5 * np.sqrt(x * f * tau / pixels))
 

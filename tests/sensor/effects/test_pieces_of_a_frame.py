@@ -92,13 +92,13 @@ LAWS: dict[str, Any] = {
 """In the order in which the camera has them."""
 
 TOGETHER = ("light_flicker", "photo_response_nonlinearity", "photodiode_lag")
-"""Without blooming, which does not say how what flows over rises."""
+"""Without blooming, whose overflow has no declared rise."""
 
 
 @pytest.mark.parametrize("names", [*((name,) for name in LAWS), TOGETHER])
 def test_charge_is_that_of_a_fine_integration(names: tuple[str, ...]) -> None:
-    """Of several together each knows what the one before made of a piece as a line.  Without the first frame, before
-    which lag takes the light as steady."""
+    """Each of several takes pieces from the one before it as lines.  Without the first frame, before which lag takes
+    the light as steady."""
     truth = light_in_time()
     for name in names:
         truth = LAWS[name](truth, **STRONG[name])
@@ -130,8 +130,8 @@ def test_engines_and_cuts_give_the_same_bits() -> None:
 
 
 def test_lamp_drift_before_a_response_reaches_its_pieces() -> None:
-    """What changes a frame as a whole is in proportion in its pieces: of light (1 + w), the response loses
-    beta (1 + w)^2 of the mean square."""
+    """Changes of a whole frame are in proportion in its pieces: of light (1 + w), the response loses beta (1 + w)^2 of
+    the mean square."""
     drift = CATALOGUE["lamp_drift"](sigma_per_root_s=10.0)
     bent = CATALOGUE["photo_response_nonlinearity"](beta=0.25)
     factor = collected((drift,)) / collected(())

@@ -100,7 +100,7 @@ def test_spurious_spikes_fill_empty_bits_with_their_probability_and_lose_none() 
 
 
 def test_afterpulsing_repeats_its_share_of_the_spikes_after_the_delay() -> None:
-    """Rate x (1 + p) at T = 5 > 2 frames; what is new lies two frames after a true spike."""
+    """Rate x (1 + p) at T = 5 > 2 frames; new spikes lie two frames after a true one."""
     p = 0.1
     spikes = camera("afterpulsing", SHAPE, probability=p, delay_frames=2).step(lit(0.2), 400).astype(bool)
     true = ideal_bits(0.2, 400)

@@ -62,10 +62,10 @@ def test_supply_ripple_of_17_kHz_leaves_the_interval_variance_of_the_read_out() 
 
 @pytest.mark.parametrize("amplitude", [-9.0, 9.0])
 def test_clock_feedthrough_gathers_the_pixels_that_an_event_by_event_simulation_gathers(amplitude: float) -> None:
-    """Pixels of T = 3.9 .. 4.1: those that have 60 intervals of 4 in a row are those of which events say so.
+    """Pixels of T = 3.9 .. 4.1: those that have 60 intervals of 4 in a row are those of the events.
 
-    The decay is linear in parts: the edges of what gathers are off by .005 a T, 1.6e-4 frames, a pixel or two each;
-    what is counted wrongly is at most one in 100 of the pixels.
+    The decay is linear in parts: the edges of the gathering are off by .005 a T, 1.6e-4 frames, a pixel or two each;
+    at most one in 100 of the pixels is counted wrongly.
     """
     rate, tau, v0 = 1.0 / np.linspace(3.9, 4.1, 2000), 0.24, 0.25
     sensor = camera("clock_feedthrough", (1, rate.size), amplitude_mV=amplitude, tau_us=25 * tau, phase_frames=v0)

@@ -1,4 +1,4 @@
-"""Threshold: what the comparator compares with, fixed, noisy or moved by others; each against its closed form."""
+"""Integration and threshold, fixed, noisy or moved by others; each against its closed form."""
 
 from __future__ import annotations
 
@@ -13,6 +13,11 @@ SWING_V = SensorModel.preset("ideal").circuit.swing_V
 
 def millivolts(relative: float) -> float:
     return 1e3 * relative * SWING_V
+
+
+def test_capacitor_spread_is_the_stated_one() -> None:
+    inverse = 1 / camera("capacitor_spread", (200, 200), sigma_fF=0.04).unit.gain
+    check("relative spread", inverse.std(), 0.04 / 4.348, 4.5 * 0.04 / 4.348 / np.sqrt(2 * inverse.size))
 
 
 def test_bias_voltage_spread_is_the_stated_one() -> None:
@@ -46,8 +51,11 @@ def assert_rates_follow_the_swing(name: str) -> None:
     assert np.ptp(expected) > 0.02
 
 
+def test_shot_noise_spreads_a_spike_by_one_over_root_n() -> None:
+    assert_pooled_variance(jittered(quanta=400.0), 1 / 20.0, "reference")
+
+
 def test_reset_noise_spreads_a_spike_by_kappa() -> None:
-    """Pooled interval variance T^2 kappa^2 + 1/6."""
     assert_pooled_variance(jittered(kappa=0.04), 0.04)
 
 
@@ -56,9 +64,10 @@ def test_excess_threshold_noise_adds_in_quadrature_to_reset_noise() -> None:
     assert_pooled_variance(model, 0.05)
 
 
-def assert_pooled_variance(model: SensorModel, kappa: float) -> None:
+def assert_pooled_variance(model: SensorModel, kappa: float, engine: str = "fast") -> None:
+    """Pooled interval variance T^2 kappa^2 + 1/6."""
     intervals = np.random.default_rng(0).permutation(np.linspace(20.0, 21.0, 4000, endpoint=False))
-    gaps = np.diff(spike_frames(model, intervals, 12, "fast"), axis=1)
+    gaps = np.diff(spike_frames(model, intervals, 12, engine), axis=1)
     check_mean(
         "interval variance - T^2 kappa^2", (gaps - intervals[:, None]) ** 2 - (kappa * intervals[:, None]) ** 2, 1 / 6
     )

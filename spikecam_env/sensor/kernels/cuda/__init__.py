@@ -28,9 +28,13 @@ def missing(effects: Sequence[Effect]) -> list[str]:
 
 
 def run(state: BatchState, segment: BatchSegment, out: torch.Tensor | None = None) -> torch.Tensor:
-    """Advance `state` over a segment; returns spikes (B, count, P) uint8, 0 or 1, in `out` where that is given.
+    """Advance `state` over a segment.
 
-    out: (B, count, P) uint8 on the state's device, any strides over cameras and frames, pixels adjoining.
+    Args:
+        out: (B, count, P) uint8 on the state's device, any strides over cameras and frames, pixels adjoining.
+
+    Returns:
+        Spikes (B, count, P) uint8, 0 or 1, in `out` where that is given.
     """
     if out is None:
         out = torch.empty((state.cameras, segment.count, state.pixels), dtype=torch.uint8, device=state.device)
@@ -53,8 +57,7 @@ ON_PROCESSOR = "use engine='fast', or SpikeSensorBatch(..., device='cpu') for ba
 
 
 def checked_device(device: str | torch.device, instead: str = ON_PROCESSOR) -> torch.device:
-    """A device to run on; raises InputError for CUDA where there is none, and says what to do instead, and for other
-    kinds."""
+    """A device to run on; InputError for a missing CUDA device, with the advice `instead`, and for other kinds."""
     try:
         chosen = torch.device(device)
     except (RuntimeError, TypeError):

@@ -1,8 +1,8 @@
 """The cuda engine in Triton: from spike to spike, a block of one camera's pixels to a program.
 
-The law, the hash and the names are those of `kernels.loop`; there they are explained.  Launched without fusing of
-multiply and add, so that light and draws round as on a processor.  The root that finds a crossing may round as it
-likes: integers decide on which side of it the crossing lies.
+The law and the names are those of `kernels.loop`, the hash is that of `compiled_tools.draws`.  It is launched without
+fusing of multiply and add, so that light and draws round as on a processor.  The root of a crossing may round anyhow:
+integers decide on which side of it the crossing lies.
 
 Import it only where Triton is: it comes with CUDA builds of torch.
 """

@@ -17,11 +17,12 @@ from numpy.typing import NDArray
 from spikecam_env.sensor.kernels import fast
 from spikecam_env.sensor.light import Segment
 from spikecam_env.sensor.unit import Unit
+from spikecam_env.types import Floats, Pictures
 
 
 @dataclass(frozen=True)
 class BatchLaw:
-    """gain, dark [grains/frame], spread [grains]: (B, P) float32, as `fast.PixelLaw`.  polynomial: (B, 8) float32."""
+    """The laws of B cameras, (B, P) and (B, 8) float32, as `fast.PixelLaw`."""
 
     gain: torch.Tensor
     dark: torch.Tensor
@@ -38,16 +39,15 @@ class BatchLaw:
 
 @dataclass
 class BatchState:
-    """Pixels mid-stream, all on one device.
-
-    remaining: (B, P) int32 grains to the next spike.  fired: (B, P) int32 spikes so far, modulo 2^32.
-    seeds: (B, 2) int32, the bits of the two words that, with a pixel's number and its spike's, fix every draw.
-    """
+    """Pixels mid-stream, all on one device."""
 
     law: BatchLaw
     remaining: torch.Tensor
+    """(B, P) int32 grains to the next spike."""
     fired: torch.Tensor
+    """(B, P) int32 spikes so far, modulo 2^32."""
     seeds: torch.Tensor
+    """(B, 2) int32: with the numbers of a pixel and of its spike they fix every draw."""
 
     @property
     def cameras(self) -> int:
@@ -77,9 +77,7 @@ class BatchState:
         return BatchState(BatchLaw(*law), *pixels)
 
 
-def start(
-    units: Sequence[Unit], phases: Sequence[NDArray[np.float64]], seeds: Sequence[int], device: torch.device
-) -> BatchState:
+def start(units: Sequence[Unit], phases: Sequence[Floats], seeds: Sequence[int], device: torch.device) -> BatchState:
     """Pixels part-way through a cycle, a unit, a phase (P,) in [0, 1) and a seed for each camera; see `fast.start`."""
     cameras = [fast.start(*one) for one in zip(units, phases, seeds, strict=True)]
     pixels = phases[0].size
@@ -104,16 +102,16 @@ def start(
 
 @dataclass(frozen=True)
 class BatchSegment:
-    """`count` frames of every camera, its light linear over a key interval of its own; see `light.Segment`.
-
-    radiance0, radiance1: (B, P) or (1, P) float32.  timing: (B, 3) or (1, 3) int32: the segment's first frame in the
-    key interval, and of an interval of n frames 2n and ceil(2^18 / 2n).  per_twice: (B, 1) or (1, 1) float32, 1 / 2n.
-    """
+    """`count` frames of every camera, its light linear over a key interval of its own; see `light.Segment`."""
 
     radiance0: torch.Tensor
+    """(B, P) or (1, P) float32."""
     radiance1: torch.Tensor
+    """As radiance0."""
     timing: torch.Tensor
+    """(B, 3) or (1, 3) int32: first frame in the key interval of n frames, 2n and ceil(2^18 / 2n)."""
     per_twice: torch.Tensor
+    """(B, 1) or (1, 1) float32, 1 / 2n."""
     count: int
 
     @classmethod
@@ -131,7 +129,7 @@ class BatchSegment:
         return cls(radiance, radiance, *_timing((0,), (count,), radiance.device), count)
 
 
-def _stacked(pictures: Sequence[NDArray[np.float32] | torch.Tensor], device: torch.device) -> torch.Tensor:
+def _stacked(pictures: Sequence[Pictures | torch.Tensor], device: torch.device) -> torch.Tensor:
     """(B, P) of B pictures; a view of one that is on the device."""
     tensors = [picture for picture in pictures if isinstance(picture, torch.Tensor)]
     if not tensors:
@@ -143,7 +141,7 @@ def _stacked(pictures: Sequence[NDArray[np.float32] | torch.Tensor], device: tor
 
 @lru_cache(maxsize=1024)
 def _timing(first: tuple[int, ...], length: tuple[int, ...], device: torch.device) -> tuple[torch.Tensor, torch.Tensor]:
-    """Kept, since what is copied to a device waits for it, and no recording of a GPU's work may wait."""
+    """Timing of segments, cached: a copy to a device waits for it, and no recording of a GPU's work may wait."""
     twice = 2 * np.array(length)
     timing = np.stack([np.array(first), twice, -(-(1 << 18) // twice)], axis=1).astype(np.int32)
     per_twice = (1.0 / twice).astype(np.float32)[:, None]

@@ -1,7 +1,8 @@
 """The spread of a threshold as a polynomial: from a sum of eight random bytes to the exact law of a spike's charge.
 
-A pixel whose threshold is N electrons, redrawn at each reset with relative spread kappa, fires when its expected charge
-has advanced by X = Gamma(N (1 + kappa n)) / N, n ~ N(0, 1).  With L = log(1 - i u / N) its characteristic function is
+A pixel has a threshold of N electrons, redrawn at each reset with relative spread kappa.  It fires when its expected
+charge has advanced by X = Gamma(N (1 + kappa n)) / N, n ~ N(0, 1).  With L = log(1 - i u / N) the law has
+the characteristic function
 
     E exp(i u X) = exp(-N L + (kappa N L)^2 / 2),       mean 1, variance s^2 = 1/N + kappa^2
 
@@ -29,9 +30,14 @@ _USED = 1e-9
 
 
 def charge_cdf(z: Floats, electrons: float, kappa: float) -> Floats:
-    """P((X - 1) / s <= z) for the law above, z (n,); electrons = inf means no shot noise (a normal law).
+    """P((X - 1) / s <= z) for the law above, to 1e-10 for N >= 20.
 
-    Gil-Pelaez: F(z) = 1/2 - (1/pi) integral_0^inf Im(exp(-i w z) phi(w)) / w dw, by trapezia; to 1e-10 for N >= 20.
+    Gil-Pelaez: F(z) = 1/2 - (1/pi) integral_0^inf Im(exp(-i w z) phi(w)) / w dw, by trapezia.
+
+    Args:
+        z: (n,).
+        electrons: N; inf for no shot noise (a normal law).
+        kappa: relative spread of the threshold.
     """
     if np.isinf(electrons):
         return np.asarray(scipy.special.ndtr(z))
@@ -57,9 +63,10 @@ def bell_cdf() -> tuple[Floats, Floats]:
 
 @lru_cache(maxsize=64)
 def fitted_polynomial(electrons: float, kappa: float) -> tuple[np.float32, ...]:
-    """Coefficients c0 .. c7 of z(x), x in (-4, 4) the centred sum of eight bytes: the law's quantile.
+    """The law's quantile, by least squares on Chebyshev polynomials, reweighted towards the smallest greatest error.
 
-    Least squares on Chebyshev polynomials, reweighted towards the smallest greatest error of the probability.
+    Returns:
+        Coefficients c0 .. c7 of z(x), x in (-4, 4) the centred sum of eight bytes.
     """
     x, probability = bell_cdf()
     used = (probability > _USED) & (probability < 1.0 - _USED)

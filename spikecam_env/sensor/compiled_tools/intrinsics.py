@@ -1,4 +1,4 @@
-"""Instructions to the compiler that numba has no word for.  None can change a bit of what is computed."""
+"""Instructions to the compiler that numba has no word for.  None can change a bit of a result."""
 
 from __future__ import annotations
 
@@ -22,12 +22,10 @@ def instruction(function: Callable[Concatenate[Any, Given], Any]) -> Callable[Gi
 
 @instruction
 def use_widest_vectors(typing_context: Any) -> Any:
-    """Compile the function that calls this with the processor's widest registers.
+    """Compile the function that calls this with the processor's widest registers."""
 
-    LLVM splits loops to 256 bits where a processor has 512 (`prefer-vector-width`), out of care for old ones that then
-    lowered their clock; where a loop is nothing but vector arithmetic, the full width is a fifth faster.
-    """
-
+    # LLVM splits loops to 256 bits where a processor has 512 (`prefer-vector-width`), out of care for old ones that
+    # then lowered their clock; where a loop is nothing but vector arithmetic, the full width is a fifth faster.
     def mark(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
         # llvmlite's own `add` knows only attributes without a value.
         set.add(builder.function.attributes, '"prefer-vector-width"="512"')
@@ -38,7 +36,7 @@ def use_widest_vectors(typing_context: Any) -> Any:
 
 @instruction
 def take_ticket(typing_context: Any, tickets: Any, row: Any) -> Any:
-    """The next number of a counter that threads share: adds one to tickets[row, 0] (int64), returns what it was."""
+    """The next number of a counter that threads share: adds one to tickets[row, 0] (int64), returns its old value."""
 
     def fetch_and_add(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
         array = make_array(signature.args[0])(context, builder, arguments[0])
@@ -51,9 +49,11 @@ def take_ticket(typing_context: Any, tickets: Any, row: Any) -> Any:
 
 @instruction
 def pointer_to(typing_context: Any, address: Any, kind: Any) -> Any:
-    """The pointer to numbers of this kind (np.float32, ...) at an address: for `numba.carray`.
+    """The pointer to numbers of this kind (np.float32, ...) at an address, for `numba.carray`.
 
-    So one call takes the arrays of many cameras, as a table of addresses.  Whoever makes the table keeps the arrays.
+    Args:
+        address: from a table, by which one call takes arrays of many cameras; its maker keeps the arrays alive.
+        kind: of the numbers.
     """
     pointer = types.CPointer(kind.dtype)
 
