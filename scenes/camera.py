@@ -15,8 +15,9 @@ from spikecam_env.errors import InputError
 def intrinsic(focal: float, centre: ArrayLike) -> NDArray[np.float64]:
     """(3, 3): directions (right, down, 1) to places (x, y, 1) of a picture [pixels].
 
-    >>> (intrinsic(125.0, (199.5, 124.5)) @ [0.0, 0.0, 1.0]).tolist()
-    [199.5, 124.5, 1.0]
+    Example:
+        >>> (intrinsic(125.0, (199.5, 124.5)) @ [0.0, 0.0, 1.0]).tolist()
+        [199.5, 124.5, 1.0]
     """
     x, y = np.asarray(centre, np.float64)
     return np.array([[focal, 0, x], [0, focal, y], [0, 0, 1]])
@@ -26,18 +27,18 @@ def intrinsic(focal: float, centre: ArrayLike) -> NDArray[np.float64]:
 class Camera:
     """A pinhole at `position` that looks at `target`.
 
-    field_of_view_deg   over the picture's height
-    shake               motion in the camera's own coordinates, e.g. `Shake()`
-
-    >>> camera = Camera(position=(0.0, 0.0, 3.0), field_of_view_deg=90.0)
-    >>> round(camera.focal(rows=250), 6), camera.pose(0.0)[:3, 3].tolist()
-    (125.0, [0.0, 0.0, 3.0])
+    Example:
+        >>> camera = Camera(position=(0.0, 0.0, 3.0), field_of_view_deg=90.0)
+        >>> round(camera.focal(rows=250), 6), camera.pose(0.0)[:3, 3].tolist()
+        (125.0, [0.0, 0.0, 3.0])
     """
 
     position: Vector = (0.0, 0.0, 3.0)
     target: Vector = (0.0, 0.0, 0.0)
     field_of_view_deg: float = 40.0
+    """Over the picture's height."""
     shake: Trajectory = AT_REST
+    """Motion in the camera's own coordinates, e.g. `Shake()`."""
     up: Vector = (0.0, 1.0, 0.0)
 
     def __post_init__(self) -> None:

@@ -26,25 +26,29 @@ from spikecam_env.sensor import Keyframes
 
 SHAPES = ("ellipse", "rectangle", "fan")
 LONGEST_KEY = 64  # frames
-MOTION_PER_KEY = 1.0  # pixels; DESIGN section 4: about 1 % rms error of linear light at 1.2
+MOTION_PER_KEY = 1.0  # pixels; about 1 % rms error of linear light at 1.2
 
 
 class Collage:
     """Scene: `layers` shapes over a background (see `scenes.protocol.Scene`).
 
-    shape          (rows, columns)
-    seed           the whole scene follows from it
-    speed          fastest layer [pixels/frame]; each layer draws its own in [0, speed], some stay still
-    light          brightest radiance; 1.0 makes the nominal pixel fire once a frame
-    contrast       darkest radiance is light / contrast
-    layers         number of shapes, background apart; default: drawn in 3..6
-    kinds          texture kinds (`scenes.textures`); default: all
-    textures       square float32 pictures in [0, 1] to use instead of procedural ones
-    Errors: InputError for an empty shape, negative speed, light <= 0 or contrast < 1.
+    Args:
+        shape: (rows, columns).
+        seed: the whole scene follows from it.
+        speed: fastest layer [pixels/frame]; each layer draws its own in [0, speed], some stay still.
+        light: brightest radiance; 1.0 makes the nominal pixel fire once a frame.
+        contrast: darkest radiance is light / contrast.
+        layers: number of shapes, background apart; default: drawn in 3..6.
+        kinds: texture kinds (`scenes.textures`); default: all.
+        textures: square float32 pictures in [0, 1] to use instead of procedural ones.
 
-    >>> scene = Collage((16, 24), seed=1)
-    >>> scene.radiance(0, 64).radiance.shape[1:]
-    (16, 24)
+    Raises:
+        InputError: a value is out of range, by name.
+
+    Example:
+        >>> scene = Collage((16, 24), seed=1)
+        >>> scene.radiance(0, 64).radiance.shape[1:]
+        (16, 24)
     """
 
     def __init__(
@@ -205,7 +209,7 @@ def _warp(
     border: int,
     into: NDArray[np.float32] | None = None,
 ) -> NDArray[np.float32]:
-    """The image at matrix (x, y, 1) for every pixel (x, y) of a picture of `shape`, bilinear; into: such a picture."""
+    """The image at matrix (x, y, 1) for every pixel (x, y) of a picture of `shape`, bilinear; `into` is overwritten."""
     flags = cv2.INTER_LINEAR | cv2.WARP_INVERSE_MAP
     return np.asarray(cv2.warpAffine(image, matrix, shape[::-1], into, flags, border), np.float32)
 

@@ -1,4 +1,4 @@
-"""What every scene made of another has of it: its size and its frame rate."""
+"""Size and frame rate of a scene that is made of another."""
 
 from __future__ import annotations
 

@@ -14,8 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scenes.keys import interval_for, key_frames
-from scenes.painted_disk import Texels
-from scenes.planes import Laid, PlanarScene, Plane, painted_planes
+from scenes.painted_disk import PlacedDisc, Plane, Texels
+from scenes.planes import PlanarScene, painted_planes
 from scenes.protocol import Gaze, Truth
 from spikecam_env.compiled import njit
 
@@ -27,14 +27,12 @@ _AT_REST = Gaze.fixed(0.0, 0.0)
 
 @dataclass(frozen=True, eq=False)
 class PiecewisePath:
-    """Straight pieces from place to place; at rest before the first and after the last.
-
-    frame  (n,) rising [frames]
-    place  (n, 2) x, y [pixels]
-    """
+    """Straight pieces from place to place; at rest before the first and after the last."""
 
     frame: NDArray[np.float64]
+    """(n,) rising [frames]."""
     place: NDArray[np.float64]
+    """(n, 2) x, y [pixels]."""
 
     @classmethod
     def still(cls, x: float, y: float) -> PiecewisePath:
@@ -93,18 +91,17 @@ class Disc:
 class Discs(PlanarScene):
     """Scene: see the head of this file.
 
-    shape          (rows, columns)
-    frame_rate_hz  frames a second
-    tile           (h, w) float32 radiance of the background, repeated; its first texel is pixel (0, 0)
-    discs          by name, from the back
-
     Truth: object n is the n-th disc; poses[name] is (x, y, angle).
     """
 
     shape: tuple[int, int]
+    """(rows, columns)."""
     frame_rate_hz: float
+    """Frames a second."""
     tile: NDArray[np.float32]
+    """(h, w) float32 radiance of the background, repeated; its first texel is pixel (0, 0)."""
     discs: dict[str, Disc]
+    """By name, from the back."""
 
     def plane(self, start: int, stop: int, gaze: Gaze | None = None) -> Plane:
         """See `PlanarScene`."""
@@ -148,13 +145,13 @@ class Discs(PlanarScene):
         return x - pan, y - tilt
 
     def _at(self, frame: NDArray[np.float64], gaze: Gaze) -> Plane:
-        """What is seen at these frames (K,)."""
+        """The plane at these frames (K,)."""
         pan, tilt = gaze.at(frame)
         laid = []
         for disc in self.discs.values():
             x, y = disc.path.along(frame)
             angle = disc.angle + disc.turn(self.frame_rate_hz) * frame
-            laid.append(Laid(disc.texels, disc.radius, x - pan, y - tilt, angle))
+            laid.append(PlacedDisc(disc.texels, disc.radius, x - pan, y - tilt, angle))
         return Plane(self.shape, frame, self.tile, pan, tilt, laid)
 
 

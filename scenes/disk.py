@@ -1,8 +1,8 @@
 """A rotating textured disk: the fast scene with a closed-form truth.
 
     angle(t) = angle(0) + w t,  w = 2 pi rpm / (60 frame_rate_hz)      [radians, radians/frame]
-    flow inside the disk  = w (dy, -dx) + drift - gaze rate             [pixels/frame]
-    flow outside the disk = - gaze rate
+    flow inside the disk: w (dy, -dx) + drift - gaze rate             [pixels/frame]
+    flow outside the disk: - gaze rate
 
 (dx, dy) is the offset from the disk's centre, y down; w > 0 turns counter-clockwise in the picture.  At
 2000 rpm and 40 kHz the rim of a disk of radius 110 moves 0.58 pixels a frame.
@@ -23,8 +23,8 @@ import scipy
 from numpy.typing import ArrayLike, NDArray
 
 from scenes.keys import interval_for, key_frames
-from scenes.painted_disk import Texels, paint_tile, prefiltered
-from scenes.planes import Laid, PlanarScene, Plane, painted_planes
+from scenes.painted_disk import PlacedDisc, Plane, Texels, paint_tile, prefiltered
+from scenes.planes import PlanarScene, painted_planes
 from scenes.protocol import FRAME_RATES_HZ, MOST_LIGHT, MOST_PLACE, Gaze, Truth
 from scenes.textures import Texture, dead_leaves, fractal_noise
 from spikecam_env.checked import (
@@ -56,28 +56,32 @@ _RANGES = {
 class RotatingDisk(PlanarScene):
     """A disk that spins and drifts over a background.
 
-    shape           (rows, columns) of the sensor
-    rpm             turns a minute; positive is counter-clockwise, 0 stands still
-    radius          [pixels]; default 0.44 of the shorter side (110 at 250 x 400)
-    light           radiance of texture value 0 and 1, linear: (dark, bright)
-    texture         (n, n) in [0, 1], the square around the disk; default `disk_texture` from the seed
-    background      a radiance, or a tile of radiance (one texel a pixel, repeated); default soft noise
-    seed            of the default texture and background
-    frame_rate_hz   frames a second
-    centre          (x, y) of the disk at frame 0 [pixels]; default the middle of the picture
-    drift_px_s      (x, y) velocity of the disk's centre [pixels/s]
-    angle           at frame 0 [radians]
-    motion_per_key  most the rim may move between two keys [pixels], as far as whole frames allow; the sensor blends
-                    two keys.  `spikecam bench scenes` prints what that costs: the light of a frame is 1.2 % rms off
-                    at 0.58 pixels a key (2000 rpm), 3.1 % at twice that
-
     Truth: object 1 is the disk; poses["disk"] is (x, y, angle) with the angle in [0, 2 pi).
-    Errors: InputError for a value out of range, by name.
 
-    >>> scene = RotatingDisk((16, 24), rpm=2000.0)
-    >>> truth = scene.truth(0.5)
-    >>> truth.radiance.shape, list(truth.poses)
-    ((16, 24), ['disk', 'camera'])
+    Args:
+        shape: (rows, columns) of the sensor.
+        rpm: turns a minute; positive is counter-clockwise, 0 stands still.
+        radius: [pixels]; default 0.44 of the shorter side (110 at 250 x 400).
+        light: radiance of texture value 0 and 1, linear: (dark, bright).
+        texture: (n, n) in [0, 1], the square around the disk; default `disk_texture` from the seed.
+        background: a radiance, or a tile of radiance (one texel a pixel, repeated); default soft noise.
+        seed: of the default texture and background.
+        frame_rate_hz: frames a second.
+        centre: (x, y) of the disk at frame 0 [pixels]; default the middle of the picture.
+        drift_px_s: (x, y) velocity of the disk's centre [pixels/s].
+        angle: at frame 0 [radians].
+        motion_per_key: most the rim may move between two keys [pixels], as far as whole frames allow; the sensor blends
+            two keys.  The light of a frame is 1.2 % rms off at 0.58 pixels a key (2000 rpm), 3.1 % at twice that
+            (`spikecam bench scenes`).
+
+    Raises:
+        InputError: a value is out of range, by name.
+
+    Example:
+        >>> scene = RotatingDisk((16, 24), rpm=2000.0)
+        >>> truth = scene.truth(0.5)
+        >>> truth.radiance.shape, list(truth.poses)
+        ((16, 24), ['disk', 'camera'])
     """
 
     def __init__(
@@ -191,9 +195,9 @@ class RotatingDisk(PlanarScene):
         return moving + (float(np.hypot(*gaze.rate)) if gaze else 0.0)
 
     def _at(self, frame: NDArray[np.float64], gaze: Gaze) -> Plane:
-        """What is seen at these frames (K,)."""
+        """The plane at these frames (K,)."""
         x, y = np.clip(self.centre_at(frame, gaze), -MOST_PLACE, MOST_PLACE)
-        disk = Laid(self._disk, self.radius, x, y, self.angle_at(frame))
+        disk = PlacedDisc(self._disk, self.radius, x, y, self.angle_at(frame))
         return Plane(self.shape, frame, self._tile, *gaze.at(frame), [disk], self._background)
 
 

@@ -22,9 +22,10 @@ _WORTH_A_THREAD = 4
 
 
 def interval_for(speed: float, motion_per_key: float) -> int:
-    """Whole frames from key to key so that nothing moves further than asked [pixels], as far as whole frames allow.
+    """Whole frames from key to key: the fastest point, at speed [pixels/frame], moves at most motion_per_key [pixels].
 
-    speed: of the fastest point [pixels/frame].
+    Returns:
+        1 to LONGEST_INTERVAL: a faster point moves further than that from frame to frame.
     """
     return int(min(max(motion_per_key / max(speed, 1e-9) + 1e-9, 1), LONGEST_INTERVAL))
 
@@ -33,7 +34,10 @@ def key_frames(shape: tuple[int, int], start: int, stop: int, interval: int, gaz
     """Frames (K,) of the keys that cover [start, stop].
 
     Without gaze they are multiples of the interval; with gaze there are keys at `start` and `stop` too, where the
-    camera's path may bend.  Errors: InputError unless start < stop, and where the pictures do not fit in memory.
+    camera's path may bend.
+
+    Raises:
+        InputError: start is not before stop, or the pictures do not fit in memory.
     """
     checked_whole(start, "start")
     checked_whole(stop, "stop")
@@ -57,10 +61,7 @@ def paint_keys(
 
 
 def side_by_side(paint: Callable[[int], None], keys: int, threads: int | None = None) -> None:
-    """Call paint(0) ... paint(keys - 1), in any order; each thread takes the next one when it is ready.
-
-    threads: default NUMBA_NUM_THREADS, fewer where there are few keys.
-    """
+    """Call paint(0) ... paint(keys - 1) in any order, on threads as `threads_for` counts them."""
     share_out(paint, keys, threads_for(keys, threads))
 
 

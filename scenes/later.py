@@ -11,17 +11,15 @@ from spikecam_env.sensor import Keyframes
 
 @dataclass(frozen=True)
 class Later(Derived):
-    """Scene: another one's light, frame 0 being its frame `frames`, a camera at rest being one at `offset`.
-
-    frames   whole frames
-    offset   (pan, tilt) [pixels]
-    drift    (pan, tilt) velocity of the mount that the camera is on [pixels/frame]; the offset is at frame 0
-    """
+    """Scene: another one's light, frame 0 being its frame `frames`, a camera at rest being one at `offset`."""
 
     scene: Placed
     frames: int = 0
+    """Whole frames."""
     offset: tuple[float, float] = (0.0, 0.0)
+    """(pan, tilt) [pixels]."""
     drift: tuple[float, float] = (0.0, 0.0)
+    """(pan, tilt) velocity of the mount that the camera is on [pixels/frame]; the offset is at frame 0."""
 
     def radiance(self, start: int, stop: int, gaze: Gaze | None = None) -> Keyframes:
         """The scene's keys, at their frames here."""

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, NamedTuple
 
 import cv2
 import numpy as np
@@ -26,12 +27,12 @@ _MARGIN = 10
 class Texels:
     """A square picture as the processor reads it fastest, in steps of 1 / 65535 of its range.
 
-    pairs  (side * side,) uint32, row by row: a texel in the lower 16 bits, the one below it in the upper.  So the four
-           around a place are two neighbours in memory, and most often one line of cache.
     A texel is worth low + step * its bits.
     """
 
     pairs: NDArray[np.uint32]
+    """(side * side,) uint32, row by row: a texel in the lower 16 bits, the one below it in the upper.  So the four
+    around a place are two neighbours in memory, and most often one line of cache."""
     side: int
     low: np.float32
     step: np.float32
@@ -49,6 +50,38 @@ class Texels:
         return replace(self, low=self.low * np.float32(gain), step=self.step * np.float32(gain))
 
 
+class PlacedDisc(NamedTuple):
+    """A disc at each key."""
+
+    texels: Texels
+    radius: float
+    """[pixels]"""
+    x: NDArray[np.float64]
+    y: NDArray[np.float64]
+    """x and y (K,) [pixels]."""
+    angle: NDArray[np.float64]
+    """(K,) [radians]."""
+
+
+@dataclass(frozen=True, eq=False)
+class Plane:
+    """A tiled background with discs before it, at each of K keys."""
+
+    shape: tuple[int, int]
+    """(rows, columns)."""
+    frame: NDArray[np.float64]
+    """(K,) frames of the keys, rising."""
+    tile: NDArray[np.float32]
+    """(h, w) radiance of the background, repeated."""
+    pan: NDArray[np.float64]
+    tilt: NDArray[np.float64]
+    """pan and tilt (K,), offset from which the background is seen [pixels]."""
+    discs: Sequence[PlacedDisc]
+    """From the back."""
+    unmoved: NDArray[np.float32] | None = None
+    """(rows, columns), the background seen from (0, 0), where it is known."""
+
+
 def places_of(
     side: NDArray[np.float64],
     radius: NDArray[np.float64],
@@ -56,9 +89,14 @@ def places_of(
     y: NDArray[np.float64],
     angle: NDArray[np.float64],
 ) -> NDArray[np.float64]:
-    """Where disks lie as they are painted: (R, 6) of x, y, u0, v0, cosine, sine (`_paint_disk`).
+    """Places of disks for painting: (R, 6) of x, y, u0, v0, cosine, sine (`_paint_disk`).
 
-    All (R,): side of the texels; radius, x, y in pixels; angle in radians, counter-clockwise in the picture.
+    Args:
+        side: (R,) of the texels.
+        radius: (R,) [pixels].
+        x: (R,) [pixels].
+        y: (R,) [pixels].
+        angle: (R,) [radians], counter-clockwise in the picture.
     """
     scale = (side - 2 * _MARGIN) / (2 * radius)
     cosine, sine = scale * np.cos(angle), scale * np.sin(angle)
@@ -68,10 +106,14 @@ def places_of(
 
 
 def prefiltered(texture: NDArray[np.floating], radius: float) -> NDArray[np.float32]:
-    """Resampled to `TEXELS_PER_PIXEL` over the disk's square and averaged over a pixel's area, whatever the angle.
+    """The texture (n, n) at `TEXELS_PER_PIXEL`, averaged over a pixel's area, whatever the angle.
 
     Resampling by area (m texels a pixel) and bilinear interpolation blur too, by 1 / 12 m^2 and 1 / 6 m^2
-    pixels^2; a box of side sqrt(1 - 3 / m^2) makes up the pixel's 1 / 12.  The border is repeated outward.
+    pixels^2; a box of side sqrt(1 - 3 / m^2) makes up the pixel's 1 / 12.
+
+    Args:
+        texture: of the square around the disk; its border is repeated outward.
+        radius: of the disk [pixels].
     """
     texels = max(2, round(2 * radius * TEXELS_PER_PIXEL))
     checked_memory(20 * texels**2, f"a disk of radius {radius:g} pixels")
@@ -99,9 +141,9 @@ BAND = 16
 """Rows of a picture that are painted at a time."""
 
 KEYS = 64
-"""Keys for which a band of rows is painted before the next one.  From key to key a disk turns by three texels at most,
-so the texels of a band are read again and again while they are in the processor's second cache (0.6 MB for the default
-disk); key by key the whole texture, 5 MB, would pass through it each time."""
+"""Keys for which a band of rows is painted before the next one.  From key to key a disk turns by three texels at most.
+So the texels of a band are read again while they are in the processor's second cache (0.6 MB for the default disk).
+Key by key the whole texture, 5 MB, would pass through it each time."""
 
 _TILE, _TILE_ROWS, _TILE_COLUMNS, _ROWS, _COLUMNS, _UNMOVED, _OUT, _SIZE, _KEYS, _FIRST_KEY, _FIRST_DISC, _STOP_DISC = (
     range(12)
@@ -128,14 +170,16 @@ def paint_scenes(
 ) -> None:
     """Pictures of tiles with disks before them: the parts, a band of rows at some keys, that this thread gets hold of.
 
-    tickets     (1, 8) int64, shared: [0, 0] is the next part, of `parts`
-    scenes      (N, 13) int64: address, rows and columns of the tile; rows and columns of the picture; address of the
-                tile as seen from (0, 0), or 0; address of the first picture, bytes to the next, how many there are, the
-                first one's number; the scene's disks, from and to; its first part (`parts_of`)
-    pan, tilt   (M,) where the tile is seen from, a picture after another
-    textures    (D, 3) int64: address of the texels (`Texels`), their side, row of `places` of the first picture
-    numbers     (D, 3): radius, low, step
-    places      (R, 6): of `places_of`
+    Args:
+        tickets: (1, 8) int64, shared: [0, 0] is the next part, of `parts`.
+        scenes: (N, 13) int64: address, rows and columns of the tile; rows and columns of the picture; address of the
+            tile as seen from (0, 0), or 0; address of the first picture, bytes to the next, how many there are, the
+            first one's number; the scene's disks, from and to; its first part (`parts_of`).
+        pan: (M,) offset from which the tile is seen, a picture after another.
+        tilt: (M,) likewise.
+        textures: (D, 3) int64: address of the texels (`Texels`), their side, row of `places` of the first picture.
+        numbers: (D, 3): radius, low, step.
+        places: (R, 6): of `places_of`.
     """
     n = 0
     while True:
@@ -218,10 +262,9 @@ def _paint_disk(
     top: int,
     picture: NDArray[np.float32],
 ) -> None:
-    """The disk over what is behind it, rows from `top` on of the picture, another array; a pixel on the rim is covered
-    by the share inside (of a half-plane).
+    """The disk over the picture behind it, rows from `top` on, into another array; the rim is covered by area.
 
-    pairs: the address of the texels; side, low, step: see `Texels`; the picture's (column, row) is read at
+    Texels stand at the address `pairs`; side, low and step are those of `Texels`.  Pixel (column, row) is read at
     (u0 + cosine column - sine row, v0 + sine column + cosine row), bilinear.  Each row goes through short loops,
     places, texels, light: the first and the last are vectors then.  Nothing but the rim is blended.
     """

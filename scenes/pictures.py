@@ -1,6 +1,6 @@
 """Picture files: one as it is stored, and a folder or a list of them as the pictures of a film.
 
-Pillow decodes what has 8 bits a value, FFmpeg what has more (PNG and TIFF of 16 bits, EXR, HDR).  The orientation that
+Pillow decodes files of 8 bits a value, FFmpeg those of more (PNG and TIFF of 16 bits, EXR, HDR).  The orientation that
 EXIF states holds.  Colour profiles (ICC) are not read.
 """
 
@@ -41,8 +41,9 @@ SRGB_GAMMA = 2.2
 def read_picture(path: str | PathLike[str]) -> StoredPicture:
     """A picture file, upright.
 
-    Errors: InputError where there is none, it is damaged, not a picture, larger than MOST_PICTURE_PIXELS, holds several
-    pictures or transparent pixels.
+    Raises:
+        InputError: the file is missing, damaged, no picture or larger than MOST_PICTURE_PIXELS, or it holds several
+            pictures or transparent pixels.
     """
     source = existing_file(Path(path))
     try:
@@ -65,7 +66,8 @@ def read_picture(path: str | PathLike[str]) -> StoredPicture:
 def pictures_in(folder: Path) -> list[Path]:
     """The pictures of a folder by the numbers in their names: img2 before img10.
 
-    Errors: InputError for a file that is no picture, fewer than two pictures, and a gap in their numbers.
+    Raises:
+        InputError: a file is no picture, there are fewer than two, or their numbers have a gap.
     """
     try:
         files = [p for p in folder.iterdir() if not p.name.startswith(".") and p.name not in NO_PICTURES]
@@ -87,8 +89,9 @@ def pictures_in(folder: Path) -> list[Path]:
 def pictures_timed(listing: Path) -> tuple[list[Path], NDArray[np.float64]]:
     """The pictures that a CSV file with the columns name and time_s lists, in its folder, and the time of each [s].
 
-    Errors: InputError, with the line, where it has other columns, a time is no number or not after the one before, or
-    a name leads out of the folder or to no file.
+    Raises:
+        InputError: columns differ, a time is no number or not after the one before, or a name leads out of the folder
+            or to no file.  The message has the line.
     """
     folder = listing.parent.resolve()
     files: list[Path] = []
@@ -162,7 +165,7 @@ def _by_ffmpeg(source: Path) -> StoredPicture:
 
 
 def check_size(width: int, height: int, source: Path | str) -> None:
-    """Errors: InputError for more than MOST_PICTURE_PIXELS."""
+    """Refuse more than MOST_PICTURE_PIXELS."""
     if width * height > MOST_PICTURE_PIXELS:
         raise InputError(
             f"{source} has {height} x {width} pixels; at most {MOST_PICTURE_PIXELS} are read, make it smaller first"
@@ -210,7 +213,7 @@ def _natural(name: str) -> list[tuple[int, int, str]]:
 
 
 def _no_gap(folder: Path, files: list[Path]) -> None:
-    """Errors: InputError where the last numbers of the names rise by one step but for some: a picture is missing."""
+    """Refuse names whose last numbers rise by one step but for some: a picture is missing."""
     numbers = [re.findall(r"\d+", p.stem) for p in files]
     if not all(numbers):
         return

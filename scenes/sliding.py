@@ -15,7 +15,6 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from scenes.keys import interval_for, key_frames, paint_keys
-from scenes.planes import on_device
 from scenes.protocol import FRAME_RATES_HZ, MOST_LIGHT, MOST_PLACE, Gaze, Truth
 from scenes.textures import dead_leaves
 from spikecam_env.checked import checked_memory, checked_number, checked_shape
@@ -29,21 +28,25 @@ SAMPLES_PER_PIXEL = 4
 class SlidingTexture:
     """Scene: one texture over the whole picture at constant velocity.
 
-    shape           (rows, columns) of the sensor
-    velocity_px_s   (x, y) [pixels/s]
-    texture         (n, m) in [0, 1], repeated; its values are little squares of light.  Default: fallen leaves
-    texel_px        size of such a square [pixels]; with 0.5 the default texture repeats every 256 pixels
-    light           radiance of texture value 0 and 1: (dark, bright)
-    seed            of the default texture
-    frame_rate_hz   frames a second
-    motion_per_key  most the texture may move between two keys [pixels], as far as whole frames allow
-
     Truth: all is object 0; poses["texture"] is where its upper left corner has gone, (x, y) [pixels].
-    Errors: InputError for a value out of range, by name.
 
-    >>> scene = SlidingTexture((16, 24), velocity_px_s=(20_000.0, 0.0))
-    >>> scene.truth(0.5).flow[0, 0].tolist()  # pixels a frame
-    [0.5, 0.0]
+    Args:
+        shape: (rows, columns) of the sensor.
+        velocity_px_s: (x, y) [pixels/s].
+        texture: (n, m) in [0, 1], repeated; its values are little squares of light.  Default: fallen leaves.
+        texel_px: size of such a square [pixels]; with 0.5 the default texture repeats every 256 pixels.
+        light: radiance of texture value 0 and 1: (dark, bright).
+        seed: of the default texture.
+        frame_rate_hz: frames a second.
+        motion_per_key: most the texture may move between two keys [pixels], as far as whole frames allow.
+
+    Raises:
+        InputError: a value is out of range, by name.
+
+    Example:
+        >>> scene = SlidingTexture((16, 24), velocity_px_s=(20_000.0, 0.0))
+        >>> scene.truth(0.5).flow[0, 0].tolist()  # pixels a frame
+        [0.5, 0.0]
     """
 
     def __init__(
@@ -70,7 +73,7 @@ class SlidingTexture:
         return f"SlidingTexture(shape={self.shape}, velocity_px_s={self.velocity_px_s})"
 
     def radiance(self, start: int, stop: int, gaze: Gaze | None = None, *, device: Any = None) -> Keyframes:
-        """Keys that cover frames [start, stop], see `scenes.keys.key_frames`; device: as of `PlanarScene.radiance`."""
+        """Keys that cover frames [start, stop]; arguments are those of `scenes.planes.PlanarScene.radiance`."""
         speed = float(np.hypot(*self.velocity(gaze)))
         frame = key_frames(self.shape, start, stop, interval_for(speed, self.motion_per_key), gaze)
         if device is not None:
@@ -114,7 +117,9 @@ class SlidingTexture:
         return x, y
 
     def _on(self, device: Any, frame: NDArray[np.float64], gaze: Gaze | None) -> Keyframes:
-        found: Keyframes = on_device().repeated_on(
+        from scenes.planes_on_device import repeated_on  # torch takes seconds
+
+        return repeated_on(
             self._samples,
             lambda samples: _in_order(samples, self._period),
             frame,
@@ -123,7 +128,6 @@ class SlidingTexture:
             SAMPLES_PER_PIXEL,
             device,
         )
-        return found
 
     def _paint(self, frame: float, gaze: Gaze | None, picture: NDArray[np.float32]) -> None:
         x, y = self._first_sample(frame, gaze)

@@ -11,7 +11,7 @@ from spikecam_env.errors import InputError
 
 Points = NDArray[np.float64]
 REPEAT, MIRROR, CLAMP, KEEP = "repeat", "mirror", "clamp", "keep"
-"""What is seen beyond a side of a picture; KEEP leaves that axis as it is, to a renderer that repeats."""
+"""The view beyond a side of a picture; KEEP leaves that axis as it is, to a renderer that repeats."""
 FARTHEST = 1e6
 """Coordinate, in pictures, at which single precision, in which files and OpenGL hold it, is off by 0.06 pictures."""
 NEAR = 1e-6

@@ -27,7 +27,7 @@ from spikecam_env.errors import InputError
 from spikecam_env.types import Pictures
 
 WRAPS = {10497: KEEP, 33071: CLAMP, 33648: MIRROR}
-"""Of a sampler, by OpenGL's numbers; renderers repeat what is kept."""
+"""Of a sampler, by OpenGL's numbers; renderers repeat along an axis that is KEEP."""
 NEAREST = 9728
 GLOSS = "KHR_materials_pbrSpecularGlossiness"
 TRANSFORM, STRENGTH = "KHR_texture_transform", "KHR_materials_emissive_strength"

@@ -1,7 +1,7 @@
 """Ray casting on the processor: needs no OpenGL, only pip.
 
 Embree finds the first triangle that a ray meets.  With the triangle's corners as columns of M, in camera
-coordinates, and the ray d = ((x - centre_x) / focal, -(y - centre_y) / focal, -1), all that shading needs follows from
+coordinates, and the ray d = ((x - centre_x) / focal, -(y - centre_y) / focal, -1), shading follows from
 
     c = M^-1 d,  depth = 1 / sum(c),  barycentric b = c / sum(c),  db/dx = (dc/dx - b sum(dc/dx)) / sum(c)
 
@@ -98,10 +98,7 @@ class _Traceable:
     def hit(
         self, matrix: NDArray[np.float64], place: tuple[float, float, float], size: tuple[int, int], supersample: int
     ) -> NDArray[np.int32]:
-        """(rows, columns, rays) the first triangle each ray meets, -1 where there is none.
-
-        place: (x, y) of the first pixel from the camera's axis, and the tangent of one pixel.
-        """
+        """(rows, columns, rays) the first triangle that each ray meets, -1 for none; `place` as in `_shade`."""
         turn = np.asarray(np.linalg.inv(matrix[:3, :3]), np.float64)
         eye = (-turn @ matrix[:3, 3] - self._middle) / self._size
         origins, directions = _rays(eye, turn, *place, *size, supersample)
@@ -173,7 +170,10 @@ def _shade(
     coverage: NDArray[np.float32],
     depth: NDArray[np.float32],
 ) -> None:
-    """Mean radiance and coverage of each pixel's rays, mean depth of those that hit."""
+    """Mean radiance and coverage of each pixel's rays, mean depth of those that hit.
+
+    `place` is (x, y) of the first pixel from the camera's axis, and the tangent of one pixel; m is from `_inverses`.
+    """
     left, top, pixel = place
     rows, columns, rays = hit.shape
     cells = round(sqrt(rays))

@@ -46,9 +46,12 @@ SHADERS = Path(__file__).parent / "shaders"
 class OpenGL:
     """Back-end by OpenGL; see `scenes.renderers.protocol.Renderer`.
 
-    kind    "egl-hardware", "egl-software" or "osmesa"; one process serves EGL or OSMesa, not both
-    Errors: RuntimeError, ImportError and others of the libraries, where the machine cannot (`choose_renderer` says
-    it in one line); NotReadyError for use in a forked process, where OpenGL would hang, or in another thread.
+    Args:
+        kind: "egl-hardware", "egl-software" or "osmesa"; one process serves EGL or OSMesa, not both.
+
+    Raises:
+        RuntimeError: this OpenGL does not draw; errors of the libraries pass through (`choose_renderer` sums them up).
+        NotReadyError: it is used in another thread, or in a forked process, where OpenGL would hang.
     """
 
     def __init__(self, kind: str) -> None:
@@ -106,7 +109,7 @@ class OpenGL:
             self._end()
 
     def _enter(self) -> None:
-        """The context is current, and what belonged to surfaces that are gone is given back."""
+        """Make the context current, and release the memory of surfaces that are gone."""
         if not self._end.alive:
             raise NotReadyError("this renderer is closed; make a new one with choose_renderer()")
         if self._home != _here():
@@ -204,7 +207,7 @@ class OpenGL:
         return self._targets
 
     def _at(self, program: Any) -> Callable[[str], int]:
-        """Where its uniforms are.  OpenGL is asked once: through Python that takes longer than to set one."""
+        """Places of its uniforms, each requested of OpenGL once: through Python that takes longer than to set one."""
         known = self._uniforms.setdefault(program._program_id, {})
 
         def place(name: str) -> int:
@@ -292,7 +295,7 @@ def _split(
     coverage: NDArray[np.float32],
     depth: NDArray[np.float32],
 ) -> None:
-    """What was read (rows, columns, 4) into pictures of its own; where nothing is seen it is infinitely far."""
+    """Split values (rows, columns, 4) into pictures; uncovered pixels are infinitely far."""
     for row in range(values.shape[0]):
         for x in range(values.shape[1]):
             radiance[row, x], coverage[row, x] = values[row, x, 0], values[row, x, 1]

@@ -47,9 +47,10 @@ def sight_of(spec: WorldSpec, cache: WorldCache, body: int, frame: float, camera
 
 
 def lay_over(picture: Pictures, sprite: Sprite, depth: Pictures) -> NDArray[np.bool_]:
-    """Lay a sprite over a picture (H, W), in place, but where the picture is nearer.
+    """Lay a sprite over a picture (H, W) of depth (H, W), in place, but where the picture is nearer.
 
-    depth: (H, W) of the picture.  Returns where the sprite is what is seen, of its window.
+    Returns:
+        Pixels of the sprite's window in which it is seen.
     """
     place = place_of(sprite.window)
     front = (sprite.coverage > 0) & (sprite.depth <= depth[place])
