@@ -14,10 +14,11 @@ from scenes.renderers.ramp import places, ramp
 from scenes.textures import Texture
 from scenes.trajectories import Trajectory
 from spikecam_env.errors import InputError
+from spikecam_env.types import Floats
 
 Albedo = float | Texture
 """Share of light that a surface throws back: one for all of it, or a texture of it, in [0, 1]."""
-Points = NDArray[np.float64]
+Points = Floats
 
 
 @dataclass(frozen=True, eq=False)
@@ -102,7 +103,7 @@ def _surface(part: Part) -> Surface:
     return Surface(mesh, part.albedo)
 
 
-def _atlas(albedos: Sequence[Albedo]) -> tuple[Texture, list[NDArray[np.float64]]]:
+def _atlas(albedos: Sequence[Albedo]) -> tuple[Texture, list[Floats]]:
     """All in one texture, shelf by shelf, each with a margin of its edge; and the places (u, v, width, height)."""
     tiles = {id(a): np.full((4, 4), a, np.float32) if np.ndim(a) == 0 else np.asarray(a, np.float32) for a in albedos}
     order = sorted(tiles, key=lambda name: -tiles[name].shape[0])

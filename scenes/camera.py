@@ -6,13 +6,14 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from scenes.trajectories import AT_REST, Pose, Trajectory, Vector
 from spikecam_env.errors import InputError
+from spikecam_env.types import Floats
 
 
-def intrinsic(focal: float, centre: ArrayLike) -> NDArray[np.float64]:
+def intrinsic(focal: float, centre: ArrayLike) -> Floats:
     """(3, 3): directions (right, down, 1) to places (x, y, 1) of a picture [pixels].
 
     Example:
@@ -56,12 +57,12 @@ class Camera:
         """[pixels] for a picture of so many rows."""
         return float(rows / 2 / np.tan(np.radians(self.field_of_view_deg) / 2))
 
-    def rest(self) -> NDArray[np.float64]:
+    def rest(self) -> Floats:
         """Camera to world (4, 4), without shake."""
         return np.asarray(self._rest.copy())
 
     @cached_property
-    def _rest(self) -> NDArray[np.float64]:
+    def _rest(self) -> Floats:
         back = np.subtract(self.position, self.target)
         back = back / np.linalg.norm(back)
         right = np.cross(self.up, back)

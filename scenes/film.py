@@ -26,7 +26,7 @@ from scenes.pictures import check_size, pictures_in, pictures_timed, read_pictur
 from scenes.transfer import grey, light_of
 from spikecam_env.errors import InputError
 from spikecam_env.renamed import old_names
-from spikecam_env.types import Pictures
+from spikecam_env.types import Floats, Pictures
 from spikecam_env.untrusted import existing_file
 
 UNSTATED_TRANSFER = "gamma2.2"
@@ -49,7 +49,7 @@ class FilmOptions:
     """"luminance", "red", "green" or "blue"."""
     film_rate_hz: float | None = None
     """Pictures a second when it was taken; None: by time stamps."""
-    times_s: NDArray[np.float64] | None = None
+    times_s: Floats | None = None
     """(T,) a time for every picture; None: by time stamps."""
     slow: float = 1.0
     """The file plays so many times slower than life."""
@@ -65,7 +65,7 @@ class Film:
 
     light: list[Pictures]
     """T pictures (h, w), linear."""
-    time_s: NDArray[np.float64]
+    time_s: Floats
     """(T,) of each from the first."""
     rate_hz: float | None
     """Pictures a second where that is constant."""
@@ -312,9 +312,7 @@ def _past(stamps: list[Any], how: FilmOptions) -> bool:
     return float(stamps[-1] - stamps[0]) / how.slow >= how.seconds
 
 
-def _times(
-    stamps: list[Any], source: _Source, how: FilmOptions, where: str
-) -> tuple[NDArray[np.float64], float | None]:
+def _times(stamps: list[Any], source: _Source, how: FilmOptions, where: str) -> tuple[Floats, float | None]:
     """Of the pictures, from the first [s]; and pictures a second where that is constant."""
     if how.film_rate_hz is not None:
         return np.arange(len(stamps)) / how.film_rate_hz, how.film_rate_hz
@@ -342,7 +340,7 @@ def _is_tick(stamp: Any, time: Any, tick_s: Fraction) -> bool:
     return bool(stamp == time or abs(stamp - time) < tick_s)
 
 
-def given_times(times_s: NDArray[np.float64], pictures: int, how: FilmOptions, where: str) -> NDArray[np.float64]:
+def given_times(times_s: Floats, pictures: int, how: FilmOptions, where: str) -> Floats:
     """The user's times of so many pictures, from the first [s].
 
     Raises:

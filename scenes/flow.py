@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scenes.protocol import Gaze, Scene, Truth
+from spikecam_env.types import Masks, Pictures
 
 STEP = 5
 """Frames that a point is carried on at a time, by the flow at the middle of them."""
@@ -72,7 +73,7 @@ def check_flow(scene: Scene, frame: float = 100, frames: int = 40, gaze: Gaze | 
     return FlowCheck(**errors, compared=float(alone.mean()))
 
 
-def _finer(scene: Scene, frame: float, gaze: Gaze | None) -> NDArray[np.float32]:
+def _finer(scene: Scene, frame: float, gaze: Gaze | None) -> Pictures:
     """The light of a pixel at every place of a grid `FINER` times as fine, (FINER H, FINER W)."""
     rows, columns = scene.shape
     light = np.empty((FINER * rows, FINER * columns), np.float32)
@@ -88,9 +89,7 @@ def _turned(gaze: Gaze, pan: float, tilt: float) -> Gaze:
     return Gaze((p + pan, q + tilt), (r + pan, s + tilt), gaze.frames)
 
 
-def _shade(
-    before: NDArray[np.float32], after: NDArray[np.float32], owner: NDArray[np.int32], compared: NDArray[np.bool_]
-) -> NDArray[np.float32]:
+def _shade(before: Pictures, after: Pictures, owner: NDArray[np.int32], compared: Masks) -> Pictures:
     """Smooth ratio of both within each object: light about a pixel afterwards, over light about it before."""
     ratio = np.ones_like(before)
     for number in np.unique(owner[compared]):
@@ -100,7 +99,7 @@ def _shade(
     return ratio
 
 
-def _alone(truth: Truth) -> NDArray[np.bool_]:
+def _alone(truth: Truth) -> Masks:
     """Pixels with one object only about them."""
     square, owner = np.ones((NEAR, NEAR), np.uint8), truth.object_id.astype(np.int16)
     return np.asarray(cv2.erode(owner, square) == cv2.dilate(owner, square))
@@ -112,12 +111,12 @@ def _alone_at(truth: Truth, x: Places, y: Places) -> NDArray[np.int32]:
     return _read(owner, x, y, cv2.INTER_NEAREST).astype(np.int32)
 
 
-def _inside(x: Places, y: Places, shape: tuple[int, int]) -> NDArray[np.bool_]:
+def _inside(x: Places, y: Places, shape: tuple[int, int]) -> Masks:
     """Far enough from the border to read about a place."""
     return (x >= 2) & (x <= shape[1] - 3) & (y >= 2) & (y <= shape[0] - 3)
 
 
-def _read(picture: NDArray[np.float32], x: Places, y: Places, how: int) -> NDArray[np.float32]:
+def _read(picture: Pictures, x: Places, y: Places, how: int) -> Pictures:
     places = x.astype(np.float32), y.astype(np.float32)
     return np.asarray(cv2.remap(picture, *places, how, borderMode=cv2.BORDER_REPLICATE), np.float32)
 

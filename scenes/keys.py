@@ -13,6 +13,7 @@ from spikecam_env.checked import checked_memory, checked_whole
 from spikecam_env.errors import InputError
 from spikecam_env.sensor import Keyframes
 from spikecam_env.threads import as_many, share_out
+from spikecam_env.types import Floats, Pictures
 
 LONGEST_INTERVAL = 64
 """Frames between two keys, at most."""
@@ -30,7 +31,7 @@ def interval_for(speed: float, motion_per_key: float) -> int:
     return int(min(max(motion_per_key / max(speed, 1e-9) + 1e-9, 1), LONGEST_INTERVAL))
 
 
-def key_frames(shape: tuple[int, int], start: int, stop: int, interval: int, gaze: Gaze | None) -> NDArray[np.float64]:
+def key_frames(shape: tuple[int, int], start: int, stop: int, interval: int, gaze: Gaze | None) -> Floats:
     """Frames (K,) of the keys that cover [start, stop].
 
     Without gaze they are multiples of the interval; with gaze there are keys at `start` and `stop` too, where the
@@ -51,9 +52,7 @@ def key_frames(shape: tuple[int, int], start: int, stop: int, interval: int, gaz
     return np.array([start, *inner, stop], np.float64)
 
 
-def paint_keys(
-    shape: tuple[int, int], frame: NDArray[Any], paint: Callable[[float, NDArray[np.float32]], None]
-) -> Keyframes:
+def paint_keys(shape: tuple[int, int], frame: NDArray[Any], paint: Callable[[float, Pictures], None]) -> Keyframes:
     """Keys at these frames (K,), rising, painted side by side by paint(frame, picture (H, W))."""
     light = np.empty((len(frame), *shape), np.float32)
     side_by_side(lambda key: paint(float(frame[key]), light[key]), len(frame))

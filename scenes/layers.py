@@ -31,7 +31,7 @@ from numpy.typing import NDArray
 from scenes.camera import intrinsic
 from scenes.renderers.protocol import Lighting, PictureWindow, Pinhole, Renderer, Sprite, Surface
 from spikecam_env.compiled import njit
-from spikecam_env.types import Floats, Pictures
+from spikecam_env.types import Floats, Masks, Pictures
 
 DENSITY = 3
 """Texels a pixel, one ray each.  On the scene `tumble` 0.9 % rms off 16 x 16 rays a pixel where things move."""
@@ -173,7 +173,7 @@ def _sampled(coverage: Pictures) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
     )
 
 
-def _spread(present: NDArray[np.bool_]) -> NDArray[np.intp]:
+def _spread(present: Masks) -> NDArray[np.intp]:
     """About SAMPLES of the places that are present, evenly from the first to the last."""
     places = np.flatnonzero(present)
     return (
@@ -600,9 +600,7 @@ def _lay(
 
 
 @njit(nogil=True, cache=True)
-def _resting(
-    boxes: NDArray[np.int64], reference: Pictures, coefficients: Pictures, share: Pictures
-) -> NDArray[np.bool_]:
+def _resting(boxes: NDArray[np.int64], reference: Pictures, coefficients: Pictures, share: Pictures) -> Masks:
     """Whether a body is seen just as at the instant before: its rows need not be read again."""
     resting = np.zeros(len(boxes), np.bool_)
     for n in range(1, len(boxes)):

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from spikecam_env.checked import checked_memory
 from spikecam_env.compiled import njit
 from spikecam_env.sensor.kernels.intrinsics import pointer_to, take_ticket, two_at, use_widest_vectors
+from spikecam_env.types import Floats, Pictures
 
 TEXELS_PER_PIXEL = 5
 """Of the prefiltered texture.  At a key the default disk is 0.75 % rms of full scale off 16 x 16 supersampling at 5,
@@ -38,7 +39,7 @@ class Texels:
     step: np.float32
 
     @classmethod
-    def of(cls, picture: NDArray[np.float32]) -> Texels:
+    def of(cls, picture: Pictures) -> Texels:
         low = picture.min()
         step = np.float32(max((picture.max() - low) / 65535, 1e-30))
         bits = np.round((picture - low) / step).astype(np.uint32)
@@ -56,10 +57,10 @@ class PlacedDisc(NamedTuple):
     texels: Texels
     radius: float
     """[pixels]"""
-    x: NDArray[np.float64]
-    y: NDArray[np.float64]
+    x: Floats
+    y: Floats
     """x and y (K,) [pixels]."""
-    angle: NDArray[np.float64]
+    angle: Floats
     """(K,) [radians]."""
 
 
@@ -69,26 +70,20 @@ class Plane:
 
     shape: tuple[int, int]
     """(rows, columns)."""
-    frame: NDArray[np.float64]
+    frame: Floats
     """(K,) frames of the keys, rising."""
-    tile: NDArray[np.float32]
+    tile: Pictures
     """(h, w) radiance of the background, repeated."""
-    pan: NDArray[np.float64]
-    tilt: NDArray[np.float64]
+    pan: Floats
+    tilt: Floats
     """pan and tilt (K,), offset from which the background is seen [pixels]."""
     discs: Sequence[PlacedDisc]
     """From the back."""
-    unmoved: NDArray[np.float32] | None = None
+    unmoved: Pictures | None = None
     """(rows, columns), the background seen from (0, 0), where it is known."""
 
 
-def places_of(
-    side: NDArray[np.float64],
-    radius: NDArray[np.float64],
-    x: NDArray[np.float64],
-    y: NDArray[np.float64],
-    angle: NDArray[np.float64],
-) -> NDArray[np.float64]:
+def places_of(side: Floats, radius: Floats, x: Floats, y: Floats, angle: Floats) -> Floats:
     """Places of disks for painting: (R, 6) of x, y, u0, v0, cosine, sine (`_paint_disk`).
 
     Args:
@@ -105,7 +100,7 @@ def places_of(
     return np.stack([x, y, u, v, cosine, sine], axis=1)
 
 
-def prefiltered(texture: NDArray[np.floating], radius: float) -> NDArray[np.float32]:
+def prefiltered(texture: NDArray[np.floating], radius: float) -> Pictures:
     """The texture (n, n) at `TEXELS_PER_PIXEL`, averaged over a pixel's area, whatever the angle.
 
     Resampling by area (m texels a pixel) and bilinear interpolation blur too, by 1 / 12 m^2 and 1 / 6 m^2
@@ -124,7 +119,7 @@ def prefiltered(texture: NDArray[np.floating], radius: float) -> NDArray[np.floa
     return np.asarray(cv2.filter2D(wide, -1, box, borderType=cv2.BORDER_REPLICATE), np.float32)
 
 
-def _turned_box(side: float) -> NDArray[np.float32]:
+def _turned_box(side: float) -> Pictures:
     """Kernel (n, n): a square of this side [texels] about the middle, averaged over all angles; sum 1."""
     fine, reach = 16, int(np.ceil(side / np.sqrt(2) + 0.5))
     size = 2 * reach + 1
@@ -133,7 +128,7 @@ def _turned_box(side: float) -> NDArray[np.float32]:
     towards_side = np.arccos(np.clip(side / 2 / np.maximum(distance, side / 2), 0, 1))
     share = np.clip(1 - towards_side / (np.pi / 4), 0, 1)
     kernel = share.reshape(size, fine, size, fine).mean(axis=(1, 3))
-    normed: NDArray[np.float32] = (kernel / kernel.sum()).astype(np.float32)
+    normed: Pictures = (kernel / kernel.sum()).astype(np.float32)
     return normed
 
 
@@ -162,11 +157,11 @@ def paint_scenes(
     tickets: NDArray[np.int64],
     parts: int,
     scenes: NDArray[np.int64],
-    pan: NDArray[np.float64],
-    tilt: NDArray[np.float64],
+    pan: Floats,
+    tilt: Floats,
     textures: NDArray[np.int64],
-    numbers: NDArray[np.float64],
-    places: NDArray[np.float64],
+    numbers: Floats,
+    places: Floats,
 ) -> None:
     """Pictures of tiles with disks before them: the parts, a band of rows at some keys, that this thread gets hold of.
 
@@ -221,14 +216,14 @@ def paint_scenes(
 
 
 @njit(inline="always")
-def _in_view(place: NDArray[np.float64], radius: float, top: int, bottom: int, columns: int) -> bool:
+def _in_view(place: Floats, radius: float, top: int, bottom: int, columns: int) -> bool:
     """Whether a disk at a place (`places_of`) is seen in rows from `top` to `bottom`."""
     reach = radius + 1
     return -reach < place[0] < columns - 1 + reach and top - reach < place[1] < bottom - 1 + reach  # type: ignore[no-any-return]
 
 
 @njit(cache=True, nogil=True)
-def paint_tile(tile: NDArray[np.float32], pan: float, tilt: float, above: int, picture: NDArray[np.float32]) -> None:
+def paint_tile(tile: Pictures, pan: float, tilt: float, above: int, picture: Pictures) -> None:
     """Rows from `above` on of the repeated tile seen from offset (pan, tilt), bilinear."""
     height, width = tile.shape
     left, top = int(np.floor(pan)), int(np.floor(tilt))
@@ -247,7 +242,7 @@ def paint_tile(tile: NDArray[np.float32], pan: float, tilt: float, above: int, p
 
 @njit(cache=True, nogil=True, fastmath=True)
 def _paint_disk(
-    behind: NDArray[np.float32],
+    behind: Pictures,
     pairs: int,
     side: np.int32,
     low: np.float32,
@@ -260,7 +255,7 @@ def _paint_disk(
     cosine: float,
     sine: float,
     top: int,
-    picture: NDArray[np.float32],
+    picture: Pictures,
 ) -> None:
     """The disk over the picture behind it, rows from `top` on, into another array; the rim is covered by area.
 
@@ -314,20 +309,14 @@ def _paint_disk(
 
 
 @njit(inline="always")
-def _copy(values: NDArray[np.float32], into: NDArray[np.float32]) -> None:
+def _copy(values: Pictures, into: Pictures) -> None:
     for i in range(len(values)):
         into[i] = values[i]
 
 
 @njit(cache=True, nogil=True, fastmath={"contract", "nnan", "nsz"})
 def _blend_rim(
-    behind: NDArray[np.float32],
-    start: int,
-    stop: int,
-    x: float,
-    dy: np.float32,
-    reach: np.float32,
-    row: NDArray[np.float32],
+    behind: Pictures, start: int, stop: int, x: float, dy: np.float32, reach: np.float32, row: Pictures
 ) -> None:
     """Pixels of a row that the disk covers in part."""
     back, light = behind[start:stop], row[start:stop]

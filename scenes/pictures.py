@@ -14,11 +14,11 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from PIL import Image, UnidentifiedImageError
 
 from scenes.frames import ALONE, StoredPicture, stated_primaries, stated_transfer, stored
 from spikecam_env.errors import InputError
+from spikecam_env.types import Floats, Pictures
 from spikecam_env.untrusted import existing_file, read_table
 
 MOST_PICTURE_PIXELS = 1 << 27
@@ -86,7 +86,7 @@ def pictures_in(folder: Path) -> list[Path]:
     return files
 
 
-def pictures_timed(listing: Path) -> tuple[list[Path], NDArray[np.float64]]:
+def pictures_timed(listing: Path) -> tuple[list[Path], Floats]:
     """The pictures that a CSV file with the columns name and time_s lists, in its folder, and the time of each [s].
 
     Raises:
@@ -129,7 +129,7 @@ def _by_pillow(image: Any, source: Path) -> StoredPicture:
     return StoredPicture(_upright(values, turn), "linear" if bits == 32 else transfer, primaries, bits)
 
 
-def _values(image: Image.Image, source: Path) -> tuple[NDArray[np.float32], int]:
+def _values(image: Image.Image, source: Path) -> tuple[Pictures, int]:
     """0..1, or floats as they are; and the bits of a value."""
     if image.mode.startswith("I;16") or (image.mode == "I" and image.format in ("PNG", "PPM")):
         return np.asarray(image, np.float32) / np.float32(65535), 16
@@ -199,7 +199,7 @@ def _stated(image: Image.Image, source: Path) -> tuple[str | None, str]:
     return f"gamma{1 / gamma:.4f}", "bt709"
 
 
-def _upright(values: NDArray[np.float32], orientation: int) -> NDArray[np.float32]:
+def _upright(values: Pictures, orientation: int) -> Pictures:
     """A picture (h, w[, 3]) turned as EXIF's orientation 1..8 says (2, 4, 5, 7 are mirrored)."""
     if orientation in (2, 4, 5, 7):
         values = values[:, ::-1]

@@ -11,7 +11,6 @@ from functools import partial
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from scenes.keys import threads_for
 from scenes.painted_disk import PlacedDisc, Plane, paint_scenes, parts_of, places_of
@@ -19,6 +18,7 @@ from scenes.protocol import Gaze
 from spikecam_env.sensor import Keyframes
 from spikecam_env.sensor.kernels.intrinsics import address_of
 from spikecam_env.threads import together
+from spikecam_env.types import Floats, Pictures
 
 
 class PlanarScene:
@@ -56,7 +56,7 @@ def painted_planes(planes: Sequence[Plane], threads: int | None = None) -> list[
     return [Keyframes.known(p.frame, pictures) for p, pictures in zip(planes, light, strict=True)]
 
 
-def paint_planes(planes: Sequence[Plane], light: Sequence[NDArray[np.float32]], threads: int | None = None) -> None:
+def paint_planes(planes: Sequence[Plane], light: Sequence[Pictures], threads: int | None = None) -> None:
     """Paint the light of each into `light`, (K, H, W) of each."""
     if not planes:
         return
@@ -88,7 +88,7 @@ def paint_planes(planes: Sequence[Plane], light: Sequence[NDArray[np.float32]], 
     together([partial(paint_scenes, *work)] * threads_for(keys, threads), shared=True)
 
 
-def _places(discs: Sequence[PlacedDisc]) -> NDArray[np.float64]:
+def _places(discs: Sequence[PlacedDisc]) -> Floats:
     """Places of each at each of its keys, one disc after another, for `paint_scenes`."""
     if not discs:
         return np.empty((0, 6))

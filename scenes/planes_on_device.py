@@ -19,6 +19,7 @@ from torch.nn.functional import grid_sample
 from scenes.painted_disk import Plane, Texels, places_of
 from spikecam_env.sensor import Keyframes
 from spikecam_env.sensor.kernels.cuda import checked_device
+from spikecam_env.types import Floats, Pictures
 
 TOGETHER = 1 << 25
 """Pixels that are painted at a time: 1 GB of intermediate results."""
@@ -52,9 +53,9 @@ def planes_on(planes: Sequence[Plane], device: str | torch.device) -> list[Keyfr
 
 def repeated_on(
     array: NDArray[Any],
-    made: Callable[[NDArray[Any]], NDArray[np.float32]],
-    frame: NDArray[np.float64],
-    first: tuple[NDArray[np.float64], NDArray[np.float64]],
+    made: Callable[[NDArray[Any]], Pictures],
+    frame: Floats,
+    first: tuple[Floats, Floats],
     shape: tuple[int, int],
     step: int,
     device: str | torch.device,
@@ -76,7 +77,7 @@ def repeated_on(
     return keys_of(frame, torch.cat([tile_on(tile, some, shape, step) for some in numbers.split(many)]))
 
 
-def keys_of(frame: NDArray[np.float64], radiance: Tensor) -> Keyframes:
+def keys_of(frame: Floats, radiance: Tensor) -> Keyframes:
     """Keys at frames (K,) whose light (K, H, W) float32 lies on a device; known to be right."""
     pictures: Any = radiance
     return Keyframes.known(frame, pictures)
@@ -98,7 +99,7 @@ class PlanePainter:
         many = max(1, TOGETHER // (self._shape[0] * self._shape[1]))
         return torch.cat([self.paint(some, still) for some in on_device.split(many)])
 
-    def numbers(self, planes: Sequence[Plane]) -> NDArray[np.float32]:
+    def numbers(self, planes: Sequence[Plane]) -> Pictures:
         """(K, OF_TILE + OF_DISC for each disc) numbers of each key."""
         pan, tilt = (np.concatenate([getattr(plane, name) for plane in planes]) for name in ("pan", "tilt"))
         of_keys = [tile_numbers(pan, tilt, self._tile.shape)]
@@ -117,7 +118,7 @@ class PlanePainter:
         return picture.expand(len(numbers), *self._shape)
 
 
-def tile_numbers(x: NDArray[np.float64], y: NDArray[np.float64], shape: Sequence[int]) -> NDArray[np.float64]:
+def tile_numbers(x: Floats, y: Floats, shape: Sequence[int]) -> Floats:
     """(K, OF_TILE) of a tile of `shape`, seen from places x, y (K,) [texels]."""
     left, top = np.floor(x), np.floor(y)
     return np.stack([left % shape[1], top % shape[0], x - left, y - top], axis=1)
@@ -164,7 +165,7 @@ def _bits(texels: Texels, device: torch.device) -> Tensor:
 
 
 def uploaded(
-    array: NDArray[Any], device: torch.device, made: Callable[[NDArray[Any]], NDArray[np.float32]] = np.asarray
+    array: NDArray[Any], device: torch.device, made: Callable[[NDArray[Any]], Pictures] = np.asarray
 ) -> Tensor:
     """A tensor on a device, made of an array that is never written to; the last KEPT are kept there."""
     key = id(array), str(device)

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from spikecam_env.checked import LARGEST_COUNT, checked_number
 from spikecam_env.errors import InputError
+from spikecam_env.types import Pictures
 
 if TYPE_CHECKING:
     from spikecam_env.sensor import Keyframes
@@ -84,13 +85,13 @@ class Truth:
         ((16, 24), (16, 24, 2), True)
     """
 
-    radiance: NDArray[np.float32]
+    radiance: Pictures
     """(H, W) float32, linear."""
-    flow: NDArray[np.float32]
+    flow: Pictures
     """(H, W, 2) float32, velocity of the surface seen in the pixel [pixels/frame], x then y."""
     object_id: NDArray[np.int32]
     """(H, W) int32, 0 is the background."""
-    depth: NDArray[np.float32] | None = None
+    depth: Pictures | None = None
     """(H, W) float32 or None where the scene is flat."""
     poses: dict[str, tuple[float, ...]] = field(default_factory=dict)
     """Object name -> its pose, as the scene documents it; "camera" is the gaze (pan, tilt) [pixels]."""

@@ -21,6 +21,7 @@ from spikecam_env.checked import checked_memory, checked_number, checked_shape
 from spikecam_env.compiled import njit
 from spikecam_env.errors import InputError
 from spikecam_env.sensor import Keyframes
+from spikecam_env.types import Floats, Pictures
 
 SAMPLES_PER_PIXEL = 4
 
@@ -116,7 +117,7 @@ class SlidingTexture:
         x, y = (-SAMPLES_PER_PIXEL * (corner + 0.5) for corner in self.corner_at(frame, gaze))
         return x, y
 
-    def _on(self, device: Any, frame: NDArray[np.float64], gaze: Gaze | None) -> Keyframes:
+    def _on(self, device: Any, frame: Floats, gaze: Gaze | None) -> Keyframes:
         from scenes.planes_on_device import repeated_on  # torch takes seconds
 
         return repeated_on(
@@ -129,12 +130,12 @@ class SlidingTexture:
             device,
         )
 
-    def _paint(self, frame: float, gaze: Gaze | None, picture: NDArray[np.float32]) -> None:
+    def _paint(self, frame: float, gaze: Gaze | None, picture: Pictures) -> None:
         x, y = self._first_sample(frame, gaze)
         _paint(self._samples, x % self._period, y % len(self._samples), picture)
 
 
-def _area_average(values: NDArray[np.floating], texel_px: float) -> NDArray[np.float64]:
+def _area_average(values: NDArray[np.floating], texel_px: float) -> Floats:
     """Averages over a pixel along the first axis, SAMPLES_PER_PIXEL a pixel; the first is that of a pixel whose
     upper edge is the texture's.
 
@@ -149,18 +150,18 @@ def _area_average(values: NDArray[np.floating], texel_px: float) -> NDArray[np.f
     middle = np.arange(samples) * (texels / samples) + pixel / 2
     integral = np.concatenate([np.zeros((1, *values.shape[1:])), np.cumsum(values, axis=0, dtype=np.float64)])
 
-    def up_to(place: NDArray[np.float64]) -> NDArray[np.float64]:
+    def up_to(place: Floats) -> Floats:
         turns, rest = np.divmod(place, texels)
         whole = np.minimum(rest.astype(int), texels - 1)
         part = (rest - whole)[:, None]
-        light: NDArray[np.float64] = integral[whole] + part * values[whole] + turns[:, None] * integral[-1]
+        light: Floats = integral[whole] + part * values[whole] + turns[:, None] * integral[-1]
         return light
 
-    average: NDArray[np.float64] = (up_to(middle + half) - up_to(middle - half)) / (2 * half)
+    average: Floats = (up_to(middle + half) - up_to(middle - half)) / (2 * half)
     return average
 
 
-def _by_phase(samples: NDArray[np.float32], columns: int) -> NDArray[np.float32]:
+def _by_phase(samples: Pictures, columns: int) -> Pictures:
     """(rows, SAMPLES_PER_PIXEL, n): samples (rows, period) so that those a pixel apart are neighbours, on and on over
     the period's end for as many columns as a picture has from any of them."""
     period = samples.shape[1]
@@ -169,14 +170,14 @@ def _by_phase(samples: NDArray[np.float32], columns: int) -> NDArray[np.float32]
     return np.ascontiguousarray(samples[:, place])
 
 
-def _in_order(samples: NDArray[np.float32], period: int) -> NDArray[np.float32]:
+def _in_order(samples: Pictures, period: int) -> Pictures:
     """(rows, period), of `_by_phase`."""
     place = np.arange(period)
     return samples[:, place % SAMPLES_PER_PIXEL, place // SAMPLES_PER_PIXEL]
 
 
 @njit(cache=True, nogil=True)
-def _paint(samples: NDArray[np.float32], x: float, y: float, picture: NDArray[np.float32]) -> None:
+def _paint(samples: Pictures, x: float, y: float, picture: Pictures) -> None:
     """The picture whose first pixel is sample (x, y), bilinear; all pixels lie alike between samples."""
     height, (rows, columns) = samples.shape[0], picture.shape
     left, top = int(x), int(y)
@@ -198,7 +199,7 @@ def _paint(samples: NDArray[np.float32], x: float, y: float, picture: NDArray[np
 def _check(
     shape: tuple[int, int],
     velocity_px_s: tuple[float, float],
-    texture: NDArray[np.float32],
+    texture: Pictures,
     texel_px: float,
     light: tuple[float, float],
     frame_rate_hz: float,

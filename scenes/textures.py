@@ -11,12 +11,12 @@ from collections.abc import Callable, Sequence
 import cv2
 import numpy as np
 import scipy
-from numpy.typing import NDArray
 
 from spikecam_env.compiled import njit
 from spikecam_env.errors import InputError, unknown_name
+from spikecam_env.types import Floats, Pictures
 
-Texture = NDArray[np.float32]
+Texture = Pictures
 
 
 def random_texture(rng: np.random.Generator, size: int, kinds: Sequence[str] | None = None) -> Texture:
@@ -199,7 +199,7 @@ def _wave_numbers(rng: np.random.Generator, highest: float) -> tuple[int, int]:
     return along, int(rng.integers(-along, along + 1))
 
 
-def _grid(size: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def _grid(size: int) -> tuple[Floats, Floats]:
     """(y, x) as (size, 1) and (1, size) in [0, 1)."""
     axis = np.arange(size) / size
     return axis[:, None], axis[None, :]
@@ -210,7 +210,7 @@ def _soften(image: Texture) -> Texture:
     return np.asarray(scipy.ndimage.gaussian_filter(image, 0.6, mode="wrap").clip(0, 1).astype(np.float32, copy=False))
 
 
-def _stretch(image: NDArray[np.float64]) -> Texture:
+def _stretch(image: Floats) -> Texture:
     """To the full range [0, 1]."""
     low, high = image.min(), image.max()
     return np.asarray(((image - low) / max(high - low, 1e-12)).astype(np.float32))

@@ -15,12 +15,13 @@ from typing import Protocol, runtime_checkable
 
 import numpy as np
 import scipy
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from spikecam_env.errors import InputError
+from spikecam_env.types import Floats
 
 Vector = tuple[float, float, float]
-Pose = NDArray[np.float64]
+Pose = Floats
 
 GRAVITY = 9.81
 """[m/s^2]"""
@@ -91,7 +92,7 @@ class Still(Motion):
         return _pose(np.shape(time_s), self._rotation, self.position)
 
     @cached_property
-    def _rotation(self) -> NDArray[np.float64]:
+    def _rotation(self) -> Floats:
         return _turns(np.radians(self.turn))
 
 
@@ -283,12 +284,12 @@ AT_REST = Still()
 _SINES = 5
 
 
-def _turns(rotation_vectors: NDArray[np.float64]) -> NDArray[np.float64]:
+def _turns(rotation_vectors: Floats) -> Floats:
     """Matrices (..., 3, 3) of rotation vectors (..., 3) [radians]."""
     return np.asarray(scipy.spatial.transform.Rotation.from_rotvec(rotation_vectors).as_matrix())
 
 
-def _turned(axis: Vector, angle: NDArray[np.float64]) -> Pose:
+def _turned(axis: Vector, angle: Floats) -> Pose:
     """Rotation by angles (...) [radians] about an axis (Rodrigues' formula)."""
     cross, twice = _crosses(tuple(axis))
     sine, versine = np.sin(angle)[..., None, None], (1 - np.cos(angle))[..., None, None]
@@ -299,7 +300,7 @@ _UNTURNED, _AT_ORIGIN = np.eye(3), np.zeros(3)
 
 
 @lru_cache(maxsize=256)
-def _crosses(axis: Vector) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def _crosses(axis: Vector) -> tuple[Floats, Floats]:
     """The matrix of the cross product with an axis of length 1, and its square; a scene asks for them in every step."""
     length = float(np.linalg.norm(axis))
     if not length > 0:
@@ -309,7 +310,7 @@ def _crosses(axis: Vector) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     return cross, cross @ cross
 
 
-def _pose(shape: tuple[int, ...], rotation: NDArray[np.float64], position: ArrayLike) -> Pose:
+def _pose(shape: tuple[int, ...], rotation: Floats, position: ArrayLike) -> Pose:
     pose = np.zeros((*shape, 4, 4))
     pose[..., :3, :3], pose[..., :3, 3], pose[..., 3, 3] = rotation, position, 1.0
     return pose

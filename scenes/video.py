@@ -18,6 +18,7 @@ from scenes.protocol import Gaze, Truth
 from scenes.transfer import CHANNELS, curve, grey, light_of
 from spikecam_env.errors import InputError, unknown_name
 from spikecam_env.sensor import Keyframes
+from spikecam_env.types import Pictures
 
 INTERPOLATIONS = ("linear", "hold")
 SHORTEST, LONGEST = 0.01, 1e12
@@ -167,7 +168,7 @@ class VideoScene:
         camera = gaze.at(frame) if gaze else (0.0, 0.0)
         return Truth(radiance, flow, np.zeros(self.shape, np.int32), poses={"camera": camera})
 
-    def _paint(self, frame: float, gaze: Gaze | None, picture: NDArray[np.float32]) -> None:
+    def _paint(self, frame: float, gaze: Gaze | None, picture: Pictures) -> None:
         place = self._place(frame)
         if self._hold:
             seen = self._picture(min(int(place), self.pictures - 1))
@@ -183,7 +184,7 @@ class VideoScene:
             seen = np.asarray(turned, np.float32)
         np.multiply(seen, self._gain, out=picture)
 
-    def _picture(self, number: int) -> NDArray[np.float32]:
+    def _picture(self, number: int) -> Pictures:
         """A picture's light; films are kept in half precision, in which nothing is to be computed."""
         return np.asarray(self._light[number].astype(np.float32, copy=False))
 

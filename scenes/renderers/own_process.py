@@ -15,11 +15,9 @@ from multiprocessing.connection import Connection
 from typing import Any
 from weakref import WeakKeyDictionary, finalize
 
-import numpy as np
-from numpy.typing import NDArray
-
 from scenes.renderers.protocol import Lighting, PictureWindow, Pinhole, Sprite, Surface
 from spikecam_env.errors import NotReadyError
+from spikecam_env.types import Floats
 
 
 class ProcessRenderer:
@@ -50,7 +48,7 @@ class ProcessRenderer:
     def render(
         self,
         surface: Surface,
-        pose: NDArray[np.float64],
+        pose: Floats,
         camera: Pinhole,
         lighting: Lighting,
         window: PictureWindow,

@@ -17,10 +17,9 @@ from typing import Any, Protocol
 
 import numpy as np
 import trimesh
-from numpy.typing import NDArray
 
 from spikecam_env.renamed import old_names
-from spikecam_env.types import Pictures
+from spikecam_env.types import Floats, Pictures
 
 
 @dataclass(frozen=True, eq=False)
@@ -36,7 +35,7 @@ class Surface:
     """Radiance that the surface gives by itself."""
 
     @cached_property
-    def middle(self) -> NDArray[np.float64]:
+    def middle(self) -> Floats:
         """(3,) of the box about the mesh."""
         return np.asarray(self.mesh.bounds.mean(axis=0))
 
@@ -53,7 +52,7 @@ class Pinhole:
     """[pixels]"""
     centre: tuple[float, float]
     """(x, y) [pixels]"""
-    pose: NDArray[np.float64]
+    pose: Floats
     """(4, 4) camera to world."""
 
 
@@ -100,7 +99,7 @@ class Renderer(Protocol):
     def render(
         self,
         surface: Surface,
-        pose: NDArray[np.float64],
+        pose: Floats,
         camera: Pinhole,
         lighting: Lighting,
         window: PictureWindow,

@@ -16,6 +16,7 @@ from scenes.renderers.protocol import Lighting, PictureWindow, Pinhole, Sprite, 
 from scenes.renderers.pyramid import Pyramid, pyramid
 from scenes.renderers.ramp import places, ramp_level
 from spikecam_env.errors import InputError
+from spikecam_env.types import Floats
 
 ROUNDING = 1e-5
 """By which luminance in single precision may exceed 1."""
@@ -27,10 +28,10 @@ NEAREST = 1e-3
 class SurfaceArrays:
     """A surface as arrays."""
 
-    vertices: NDArray[np.float64]
-    normals: NDArray[np.float64]
+    vertices: Floats
+    normals: Floats
     """(V, 3) float64."""
-    uv: NDArray[np.float64]
+    uv: Floats
     """(V, 2) float64; zeros where the albedo is one value, places on the ramp where it is one for each vertex."""
     faces: NDArray[np.int32]
     """(F, 3) int32."""
@@ -112,7 +113,7 @@ def check_albedo(albedo: ArrayLike, name: str) -> None:
         )
 
 
-def to_camera(pose: NDArray[np.float64], camera: Pinhole) -> NDArray[np.float64]:
+def to_camera(pose: Floats, camera: Pinhole) -> Floats:
     """(4, 4): a surface's coordinates to the camera's.
 
     Raises:
@@ -124,12 +125,12 @@ def to_camera(pose: NDArray[np.float64], camera: Pinhole) -> NDArray[np.float64]
     return np.linalg.inv(camera.pose) @ pose
 
 
-def moved(points: NDArray[np.float64], matrix: NDArray[np.float64]) -> NDArray[np.float64]:
+def moved(points: Floats, matrix: Floats) -> Floats:
     """Points (N, 3) through a (4, 4) matrix."""
     return np.asarray(points @ matrix[:3, :3].T + matrix[:3, 3])
 
 
-def reached(vertices: NDArray[np.float64], camera: Pinhole, window: PictureWindow) -> PictureWindow | None:
+def reached(vertices: Floats, camera: Pinhole, window: PictureWindow) -> PictureWindow | None:
     """The part of the window that these vertices (N, 3) in camera coordinates can cover; None where none."""
     distance = -vertices[:, 2]
     if distance.max() <= 0:
@@ -143,7 +144,7 @@ def reached(vertices: NDArray[np.float64], camera: Pinhole, window: PictureWindo
     return PictureWindow(top, left, bottom - top, right - left) if top < bottom and left < right else None
 
 
-def towards(lighting: Lighting) -> NDArray[np.float64]:
+def towards(lighting: Lighting) -> Floats:
     """(3,) unit vector to the lamp.
 
     Raises:
@@ -187,7 +188,7 @@ def _closed(mesh: trimesh.Trimesh) -> bool:
     return bool(sewn.is_volume)
 
 
-def _overlap(positions: NDArray[np.float64], first: int, count: int) -> tuple[int, int]:
+def _overlap(positions: Floats, first: int, count: int) -> tuple[int, int]:
     """Pixels [start, stop) of a row of `count` that an interval of positions touches."""
     low = np.clip(np.floor(positions.min() + 0.5), first, first + count)
     high = np.clip(np.floor(positions.max() + 0.5) + 1, first, first + count)

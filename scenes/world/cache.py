@@ -11,14 +11,12 @@ from collections.abc import Callable, Hashable
 from dataclasses import dataclass
 from typing import Generic, TypeVar
 
-import numpy as np
-from numpy.typing import NDArray
-
 from scenes.layers import BodyKey
 from scenes.renderers.protocol import PictureWindow, Pinhole, Sprite
 from scenes.world.extent import Probe, probe_of
 from scenes.world.plan import BlockPlan, Pace
 from scenes.world.spec import WorldSpec
+from spikecam_env.types import Floats, Pictures
 
 PLANS = 64
 """Blocks whose plans are kept: 0.4 s of the camera's time."""
@@ -40,9 +38,9 @@ T = TypeVar("T")
 class Sight:
     """A body before the camera at a frame."""
 
-    pose: NDArray[np.float64]
+    pose: Floats
     camera: Pinhole
-    view: NDArray[np.float64]
+    view: Floats
     """(4, 4) from its coordinates to the camera's."""
     window: PictureWindow
     """The part of the picture that is rendered."""
@@ -89,9 +87,9 @@ class WorldCache:
     at 250 x 400."""
     backdrops: RecentResults[Sprite]
     """2 B backdrops rendered at an instant, 12 bytes a pixel."""
-    tile: RecentResults[NDArray[np.float32]]
+    tile: RecentResults[Pictures]
     """1 background picture at one texel a pixel."""
-    base: RecentResults[NDArray[np.float32]]
+    base: RecentResults[Pictures]
     """1 picture of all that stands still behind the bodies."""
 
     @classmethod

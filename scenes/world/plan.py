@@ -11,14 +11,13 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from scenes.layers import fit, project
 from scenes.protocol import Gaze
 from scenes.renderers.protocol import Lighting
 from scenes.world.extent import Probe, boxes_overlap, extent
 from scenes.world.spec import WorldSpec
-from spikecam_env.types import Floats
+from spikecam_env.types import Floats, Masks
 
 BLOCK = 256
 """Frames that are planned together."""
@@ -212,7 +211,7 @@ def _middle_is_lit_like_the_ends(facing: Floats, depth: Floats, shade: Floats) -
     return bool(not shown.any() or np.sqrt((shading**2).mean()) <= SHADE)
 
 
-def _shown(facing: Floats, depth: Floats) -> NDArray[np.bool_]:
+def _shown(facing: Floats, depth: Floats) -> Masks:
     """Points that are seen half-way."""
     return np.asarray((facing[len(facing) // 2] > 0.05) & (depth > 0).all(0))
 

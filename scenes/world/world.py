@@ -18,7 +18,6 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from scenes.protocol import Gaze, Truth
 from scenes.world.cache import WorldCache
@@ -29,6 +28,7 @@ from scenes.world.sprites import TRUTH_RAYS
 from scenes.world.truth import places_at, seen_at, truth_at
 from spikecam_env.errors import InputError
 from spikecam_env.sensor import Keyframes
+from spikecam_env.types import Pictures
 
 
 @dataclass(frozen=True, eq=False)
@@ -96,7 +96,7 @@ class World(WorldSpec):
         """Ground truth at a frame, each body rendered at that very instant."""
         return truth_at(self, self.cache, self.plan(int(frame // BLOCK)), frame, gaze)
 
-    def picture(self, frame: float, gaze: Gaze | None = None, rays: int = TRUTH_RAYS) -> NDArray[np.float32]:
+    def picture(self, frame: float, gaze: Gaze | None = None, rays: int = TRUTH_RAYS) -> Pictures:
         """The radiance (H, W) at an instant, by rays x rays a pixel."""
         return seen_at(self, self.cache, self.plan(int(frame // BLOCK)), frame, gaze, rays).radiance
 
