@@ -36,7 +36,7 @@ class PiecewisePath:
 
     @classmethod
     def still(cls, x: float, y: float) -> PiecewisePath:
-        """Always there."""
+        """At rest at one place."""
         return cls(np.zeros(1), np.array([[x, y]], np.float64))
 
     @classmethod
@@ -95,9 +95,7 @@ class Discs(PlanarScene):
     """
 
     shape: tuple[int, int]
-    """(rows, columns)."""
     frame_rate_hz: float
-    """Frames a second."""
     tile: Pictures
     """(h, w) float32 radiance of the background, repeated; its first texel is pixel (0, 0)."""
     discs: dict[str, Disc]
@@ -158,11 +156,11 @@ class Discs(PlanarScene):
 @njit(cache=True, nogil=True)
 def _along(frames: Floats, knots: Floats, places: Floats) -> Floats:
     """`_at` of both axes at each of frames (K,)."""
-    found = np.empty((2, len(frames)))
+    places_at = np.empty((2, len(frames)))
     for k in range(len(frames)):
         for axis in range(2):
-            found[axis, k] = _at(frames[k], knots, places, axis)
-    return found
+            places_at[axis, k] = _at(frames[k], knots, places, axis)
+    return places_at
 
 
 @njit(cache=True, nogil=True)

@@ -42,14 +42,19 @@ def key_frames(shape: tuple[int, int], start: int, stop: int, interval: int, gaz
     """
     checked_whole(start, "start")
     checked_whole(stop, "stop")
-    if not start < stop:
-        raise InputError(f"frames {start} to {stop} asked; the first must be before the second")
+    check_frames(start, stop)
     keys = (stop - start) // interval + 2
     checked_memory(4 * keys * shape[0] * shape[1], f"light of frames {start} to {stop}, {keys} keys,")
     if gaze is None:
         return (np.arange(start // interval, -(-stop // interval) + 1) * interval).astype(np.float64)
     inner = range((start // interval + 1) * interval, stop, interval)
     return np.array([start, *inner, stop], np.float64)
+
+
+def check_frames(start: int, stop: int) -> None:
+    """Refuse an empty range of frames."""
+    if not start < stop:
+        raise InputError(f"frames run from {start} to {stop}; the first must be before the second")
 
 
 def paint_keys(shape: tuple[int, int], frame: NDArray[Any], paint: Callable[[float, Pictures], None]) -> Keyframes:

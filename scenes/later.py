@@ -23,18 +23,18 @@ class Later(Derived):
 
     def radiance(self, start: int, stop: int, gaze: Gaze | None = None) -> Keyframes:
         """The scene's keys, at their frames here."""
-        keys = self.scene.radiance(start + self.frames, stop + self.frames, self._there(gaze))
+        keys = self.scene.radiance(start + self.frames, stop + self.frames, self._gaze_of_scene(gaze))
         return Keyframes.known(keys.frame - self.frames, keys.radiance)
 
     def truth(self, frame: float, gaze: Gaze | None = None) -> Truth:
         """The scene's truth; its camera pose has the offset in it."""
-        return self.scene.truth(frame + self.frames, self._there(gaze))
+        return self.scene.truth(frame + self.frames, self._gaze_of_scene(gaze))
 
     def places(self, frame: float, gaze: Gaze | None = None) -> dict[str, tuple[float, float]]:
         """The scene's places."""
-        return self.scene.places(frame + self.frames, self._there(gaze))
+        return self.scene.places(frame + self.frames, self._gaze_of_scene(gaze))
 
-    def _there(self, gaze: Gaze | None) -> Gaze | None:
+    def _gaze_of_scene(self, gaze: Gaze | None) -> Gaze | None:
         if gaze is None and self.offset == self.drift == (0.0, 0.0):
             return None
         gaze = gaze or Gaze.fixed(0.0, 0.0)

@@ -128,7 +128,7 @@ def _tints(light: Pictures, brightest: np.float32, cover: Pictures) -> NDArray[n
 
 
 def _filled(sprite: Sprite) -> Pictures:
-    """Depth, and beside the body that of the texel nearest to there; 0 where nothing is seen at all."""
+    """Depth, and beside the body that of the texel nearest to there; 0 where no texel is covered."""
     nothing = np.logical_not((sprite.coverage > 0) & np.isfinite(sprite.depth)).astype(np.uint8)
     if nothing.all():
         return np.zeros_like(sprite.depth)

@@ -65,7 +65,7 @@ def from_file(
     source = Path(path)
     if not _is_file(source):
         raise InputError(f"no mesh file {path}; give the path of an obj, stl, ply or glb file")
-    beside, unread = Beside(str(source)), dict[str, None]()
+    beside, unread = NeighbourFiles(str(source)), dict[str, None]()
     try:
         pieces = _sized(_pieces(source, beside, unread, texture is None), size)
         surface = _one_surface([_merged(piece) for piece in pieces], texture, unread)
@@ -128,7 +128,7 @@ def picture(path: str | PathLike[str]) -> Texture:
     return grey(light_of(stored.values, stored.transfer or "srgb", str(path)), primaries=stored.primaries)
 
 
-class Beside(trimesh.resolvers.FilePathResolver):
+class NeighbourFiles(trimesh.resolvers.FilePathResolver):
     """Files that a mesh file names, in its folder.
 
     Args:
@@ -164,7 +164,7 @@ class Beside(trimesh.resolvers.FilePathResolver):
         return data
 
 
-def _pieces(source: Path, beside: Beside, unread: dict[str, None], own: bool) -> list[MeshPart]:
+def _pieces(source: Path, beside: NeighbourFiles, unread: dict[str, None], own: bool) -> list[MeshPart]:
     """The meshes of a file; their albedos where it is a glTF file, which has them in its own way.
 
     Raises:
@@ -186,7 +186,7 @@ def _pieces(source: Path, beside: Beside, unread: dict[str, None], own: bool) ->
         raise InputError(f"it cannot be read as a mesh ({why}); give an obj, stl, ply or glb file") from error
 
 
-def _by_trimesh(kind: str, data: bytes, beside: Beside, unread: dict[str, None]) -> list[trimesh.Trimesh]:
+def _by_trimesh(kind: str, data: bytes, beside: NeighbourFiles, unread: dict[str, None]) -> list[trimesh.Trimesh]:
     """The meshes of a file that is no glTF; adds the parts that they do not show to `unread`."""
     if kind in ARCHIVES:
         raise InputError("it is an archive; unpack it, and give the mesh file in it")
@@ -268,7 +268,7 @@ def _textured(mesh: trimesh.Trimesh, albedo: Albedo) -> Surface:
 
 
 def _sized(pieces: Sequence[MeshPart], size: float | None) -> list[MeshPart]:
-    """Copies, checked; their longest side as asked, their middle at the origin."""
+    """Checked copies with the longest side given, the middle at the origin."""
     if not any(len(getattr(piece.mesh, "faces", ())) for piece in pieces):
         raise InputError("the mesh has no triangles; a cloud of points has no surface to render")
     if size is not None and not 0 < size < np.inf:

@@ -69,7 +69,6 @@ class Plane:
     """A tiled background with discs before it, at each of K keys."""
 
     shape: tuple[int, int]
-    """(rows, columns)."""
     frame: Floats
     """(K,) frames of the keys, rising."""
     tile: Pictures

@@ -29,7 +29,7 @@ GRAVITY = 9.81
 
 @runtime_checkable
 class Trajectory(Protocol):
-    """Anything with a pose over time; no state, so any time may be asked for in any order.
+    """Anything with a pose over time; no state, so times may come in any order.
 
     Example:
         >>> isinstance(Still(), Trajectory)

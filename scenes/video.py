@@ -1,4 +1,4 @@
-"""A film of yours as a scene: light that was really there, without a truth about motion."""
+"""A film as a scene: real light, without a truth about motion."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from scenes.exposure import checked_interval
 from scenes.film import Film, FilmOptions, fitted, given_times, read_array, read_film
-from scenes.keys import LONGEST_INTERVAL, interval_for, paint_keys
+from scenes.keys import LONGEST_INTERVAL, check_frames, interval_for, paint_keys
 from scenes.protocol import Gaze, Truth
 from scenes.transfer import CHANNELS, curve, grey, light_of
 from spikecam_env.errors import InputError, unknown_name
@@ -51,7 +51,7 @@ class VideoScene:
         slow: the file plays so many times slower than life: its time stamps are divided by it.
         seconds: of the film's true time to be read; default: all.
         mean_interval: scale the light so that pixels fire every so many frames on average over the film, or over the
-            seconds of it that were asked; default: not.
+            `seconds` of it; default: not.
 
     Raises:
         InputError: the film cannot be read or has fewer than two pictures, or its time stamps do not rise.  The
@@ -151,8 +151,7 @@ class VideoScene:
 
     def radiance(self, start: int, stop: int, gaze: Gaze | None = None) -> Keyframes:
         """Keys that cover frames [start, stop], at most 64 apart: the whole frames next to every picture's time."""
-        if not start < stop:
-            raise InputError(f"frames {start} to {stop} asked; the first must be before the second")
+        check_frames(start, stop)
         frame = self._key_frames(start, stop)
         if gaze is not None:
             interval = interval_for(float(np.hypot(*gaze.rate)), 0.6)

@@ -137,7 +137,7 @@ class Looks:
         return None if self._opened(number) is None else int(number)
 
     def _opened(self, number: int) -> tuple[Pictures, Pictures] | None:
-        """Colours (h, w, 3) and alpha (h, w) of an image; None, with a note, where it is not there or damaged."""
+        """Colours (h, w, 3) and alpha (h, w) of an image; None, with a note, where it is missing or damaged."""
         if number not in self._pixels:
             self._pixels[number] = None
             if (data := self._bytes(number)) is not None:

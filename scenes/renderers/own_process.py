@@ -1,7 +1,7 @@
 """A renderer in a process of its own, for a fork of a process that has used OpenGL, in which OpenGL cannot start.
 
 Same library, same driver, same bits.  The process is started afresh, not forked.  It is sent each surface once.  It
-ends when its pipe closes, and so does not outlive the process that asked for it.
+ends when its pipe closes, and so does not outlive the process that started it.
 """
 
 from __future__ import annotations

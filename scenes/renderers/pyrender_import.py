@@ -1,6 +1,6 @@
 """pyrender without a window, on the versions of today.
 
-pyrender 0.1.45 is dormant: its viewer pulls in pyglet and X11, and it needs to be told of headless OpenGL before
+pyrender 0.1.45 is dormant: its viewer pulls in pyglet and X11, and the platform of headless OpenGL must be set before
 PyOpenGL is first imported.  Of pyrender we use the EGL contexts, the upload of meshes and the shader programs.
 Its faulty parts are not used: 8-bit gamma-encoded pictures, `Mesh.bounds` (np.infty), `Texture` (unaligned
 rows, glGenTextures of PyOpenGL 3.1.0 on Python >= 3.12), `OffscreenRenderer.delete` (ends everybody's contexts).

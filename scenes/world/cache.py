@@ -1,7 +1,7 @@
 """Results that a world keeps for its next call.
 
 Everything in it follows from the world: an entry that is dropped is made again, bit for bit.  Each kind has a limit of
-its own, in entries; the entry asked for least recently goes first.  A copied or unpickled world begins with nothing.
+its own, in entries; the entry used least recently goes first.  A copied or unpickled world begins with nothing.
 """
 
 from __future__ import annotations
@@ -47,7 +47,7 @@ class Sight:
 
 
 class RecentResults(Generic[T]):
-    """The results asked for most recently, by name: at most `most` of them, and at least one."""
+    """The results used most recently, by name: at most `most` of them, and at least one."""
 
     def __init__(self, most: int) -> None:
         self.most = max(most, 1)

@@ -50,7 +50,6 @@ class BlockPlan:
     """Consequences of the motion in a block, of all bodies together."""
 
     block: int
-    """Its number."""
     speed: float
     """Fastest point in the picture [pixels/frame]."""
     order: tuple[int, ...]
@@ -228,10 +227,10 @@ def _misplaced(pixels: Floats, depth: Floats, facing: Floats, sight: Floats) -> 
     slope = np.sqrt(np.maximum(1 - cosine**2, 0)) / cosine
     flat, left = [], []
     for end in (0, -1):
-        reference, found = fit(pixels[end, shown], pixels[middle : middle + 1, shown])
+        reference, coefficients = fit(pixels[end, shown], pixels[middle : middle + 1, shown])
         u, v = ((pixels[middle, shown] - reference[0, :2]) * reference[0, 2]).T
         basis = np.stack([np.ones_like(u), u, v, u * u, u * v, v * v])
-        flat.append((found[0] @ basis).T - pixels[end, shown])
+        flat.append((coefficients[0] @ basis).T - pixels[end, shown])
         turned = np.linalg.norm(sight[end, shown] - sight[middle, shown], axis=-1)
         left.append(flat[-1] * np.minimum(turned * slope, 1)[:, None])
     by_polynomial, by_depth = (float(np.sqrt(((a - b) ** 2).sum(-1).mean())) for a, b in (flat, left))

@@ -19,6 +19,7 @@ from typing import Any
 
 import numpy as np
 
+from scenes.keys import check_frames
 from scenes.protocol import Gaze, Truth
 from scenes.world.cache import WorldCache
 from scenes.world.paint import paint, pieces_of
@@ -26,7 +27,6 @@ from scenes.world.plan import BLOCK, BlockPlan, blocks_of, key_frames, plan_bloc
 from scenes.world.spec import WorldSpec
 from scenes.world.sprites import TRUTH_RAYS
 from scenes.world.truth import places_at, seen_at, truth_at
-from spikecam_env.errors import InputError
 from spikecam_env.sensor import Keyframes
 from spikecam_env.types import Pictures
 
@@ -80,8 +80,7 @@ class World(WorldSpec):
         Raises:
             InputError: start is not before stop.
         """
-        if not start < stop:
-            raise InputError(f"frames {start} to {stop} asked; the first must be before the second")
+        check_frames(start, stop)
         steps = {b: self.plan(b).light_step(self.motion_per_key, gaze) for b in blocks_of(start, stop)}
         frames = key_frames(steps, start, stop, with_ends=gaze is not None)
         pictures = np.empty((len(frames), *self.shape), np.float32)

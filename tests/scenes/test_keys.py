@@ -45,5 +45,5 @@ def test_later_is_the_same_light_from_another_moment_and_place(scene, gaze: Gaze
 
 
 def test_frames_must_run_forwards() -> None:
-    with pytest.raises(InputError, match="frames 9 to 9 asked"):
+    with pytest.raises(InputError, match="frames run from 9 to 9"):
         SlidingTexture(SHAPE).radiance(9, 9)
