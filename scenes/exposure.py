@@ -12,8 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from scenes.derived import Derived
-from scenes.protocol import Dimmable, Gaze, Placed, Scene, Truth
+from scenes.protocol import Derived, Dimmable, Gaze, Placed, Scene, Truth
 from spikecam_env.checked import checked_number
 from spikecam_env.errors import InputError
 from spikecam_env.sensor import Keyframes

@@ -8,9 +8,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from scenes.derived import Derived
 from scenes.exposure import METERED_FRAMES
-from scenes.protocol import Gaze, Scene, Truth
+from scenes.protocol import Derived, Gaze, Scene, Truth
 from spikecam_env.checked import checked_number
 from spikecam_env.errors import InputError
 from spikecam_env.sensor import Keyframes

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from scenes.derived import Derived
-from scenes.protocol import Gaze, Placed, Truth
+from scenes.protocol import Derived, Gaze, Placed, Truth
 from spikecam_env.sensor import Keyframes
 
 

@@ -148,3 +148,19 @@ class Dimmable(Scene, Protocol):
     def lit(self, gain: float) -> Scene:
         """The same with `gain` times its light."""
         ...
+
+
+class Derived:
+    """Base of a scene made of `scene`, whose light it shows in its own way; size and frame rate are the same."""
+
+    scene: Scene
+
+    @property
+    def shape(self) -> tuple[int, int]:
+        """(rows, columns)."""
+        return self.scene.shape
+
+    @property
+    def frame_rate_hz(self) -> float:
+        """Frames a second."""
+        return self.scene.frame_rate_hz

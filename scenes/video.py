@@ -273,7 +273,7 @@ def _film(film: str | PathLike[str] | NDArray[np.generic], how: FilmOptions) -> 
 
 
 def _transfer(transfer: str | None, gamma: float | None) -> str | None:
-    """The name of one; errors: InputError for an unknown one, and where both are given."""
+    """The name of the transfer, known, from one of the two options at most."""
     if gamma is not None:
         if transfer is not None:
             raise InputError(f"transfer is {transfer!r} and gamma {gamma}; give one of the two")
