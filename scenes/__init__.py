@@ -1,4 +1,4 @@
-"""What the camera looks at: light over time, and the truth about it."""
+"""Scenes before the camera: light over time, and the truth about it."""
 
 from scenes.collage import Collage
 from scenes.disk import RotatingDisk

@@ -14,27 +14,31 @@ from scenes.renderers.ramp import places, ramp
 from scenes.textures import Texture
 from scenes.trajectories import Trajectory
 from spikecam_env.errors import InputError
+from spikecam_env.types import Floats
 
 Albedo = float | Texture
 """Share of light that a surface throws back: one for all of it, or a texture of it, in [0, 1]."""
-Points = NDArray[np.float64]
+Points = Floats
 
 
 @dataclass(frozen=True, eq=False)
 class Part:
-    """vertices, normals (V, 3); uv (V, 2), v = 1 at the top of the texture; faces (F, 3).
+    """A part of a surface: triangles, and their albedo.
 
-    albedo: 0..1, linear: one value, one for each vertex (V,), or a texture (h, w).
-
-    >>> disc(0.5).scaled(2.0).vertices.max(axis=0).round(6).tolist()
-    [1.0, 1.0, 0.0]
+    Example:
+        >>> disc(0.5).scaled(2.0).vertices.max(axis=0).round(6).tolist()
+        [1.0, 1.0, 0.0]
     """
 
     vertices: Points
     normals: Points
+    """(V, 3), as the vertices."""
     uv: Points
+    """(V, 2); v = 1 is the top of the texture."""
     faces: NDArray[np.int64]
+    """(F, 3)"""
     albedo: Albedo = 0.8
+    """0..1, linear: one value, one for each vertex (V,), or a texture (h, w)."""
 
     def moved(self, by: Trajectory) -> Part:
         """Turned and shifted as a trajectory is at time 0."""
@@ -54,8 +58,9 @@ def assemble(*parts: Part) -> Surface:
     """One rigid surface; textures and greys of several parts go into one atlas, greys and albedos of vertices into one
     for each vertex.
 
-    >>> len(assemble(*box((1.0, 1.0, 1.0)), disc(0.4)).mesh.faces)
-    108
+    Example:
+        >>> len(assemble(*box((1.0, 1.0, 1.0)), disc(0.4)).mesh.faces)
+        108
     """
     if not parts:
         raise InputError("a surface needs at least one part")
@@ -85,7 +90,7 @@ def joined(parts: Sequence[Part], uv: Sequence[Points], albedo: Albedo) -> Part:
 
 _TILE = np.repeat(ramp(16), 16, axis=0)
 """Albedos of vertices among textures, known to 3e-4 (1/256 of the way between texels).  It is as small as its margin,
-so that what is read coarsely stays in it."""
+so that coarse reading stays in it."""
 
 
 def _on_a_tile(part: Part) -> Part:
@@ -98,7 +103,7 @@ def _surface(part: Part) -> Surface:
     return Surface(mesh, part.albedo)
 
 
-def _atlas(albedos: Sequence[Albedo]) -> tuple[Texture, list[NDArray[np.float64]]]:
+def _atlas(albedos: Sequence[Albedo]) -> tuple[Texture, list[Floats]]:
     """All in one texture, shelf by shelf, each with a margin of its edge; and the places (u, v, width, height)."""
     tiles = {id(a): np.full((4, 4), a, np.float32) if np.ndim(a) == 0 else np.asarray(a, np.float32) for a in albedos}
     order = sorted(tiles, key=lambda name: -tiles[name].shape[0])

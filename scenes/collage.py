@@ -23,28 +23,33 @@ from spikecam_env.checked import checked_number, checked_shape
 from spikecam_env.compiled import njit
 from spikecam_env.errors import InputError
 from spikecam_env.sensor import Keyframes
+from spikecam_env.types import Floats, Pictures
 
 SHAPES = ("ellipse", "rectangle", "fan")
 LONGEST_KEY = 64  # frames
-MOTION_PER_KEY = 1.0  # pixels; DESIGN section 4: about 1 % rms error of linear light at 1.2
+MOTION_PER_KEY = 1.0  # pixels; about 1 % rms error of linear light at 1.2
 
 
 class Collage:
     """Scene: `layers` shapes over a background (see `scenes.protocol.Scene`).
 
-    shape          (rows, columns)
-    seed           the whole scene follows from it
-    speed          fastest layer [pixels/frame]; each layer draws its own in [0, speed], some stay still
-    light          brightest radiance; 1.0 makes the nominal pixel fire once a frame
-    contrast       darkest radiance is light / contrast
-    layers         number of shapes, background apart; default: drawn in 3..6
-    kinds          texture kinds (`scenes.textures`); default: all
-    textures       square float32 pictures in [0, 1] to use instead of procedural ones
-    Errors: InputError for an empty shape, negative speed, light <= 0 or contrast < 1.
+    Args:
+        shape: (rows, columns).
+        seed: the whole scene follows from it.
+        speed: fastest layer [pixels/frame]; each layer draws its own in [0, speed], some stay still.
+        light: brightest radiance; 1.0 makes the nominal pixel fire once a frame.
+        contrast: darkest radiance is light / contrast.
+        layers: number of shapes, background apart; default: drawn in 3..6.
+        kinds: texture kinds (`scenes.textures`); default: all.
+        textures: square float32 pictures in [0, 1] to use instead of procedural ones.
 
-    >>> scene = Collage((16, 24), seed=1)
-    >>> scene.radiance(0, 64).radiance.shape[1:]
-    (16, 24)
+    Raises:
+        InputError: a value is out of range, by name.
+
+    Example:
+        >>> scene = Collage((16, 24), seed=1)
+        >>> scene.radiance(0, 64).radiance.shape[1:]
+        (16, 24)
     """
 
     def __init__(
@@ -57,7 +62,7 @@ class Collage:
         contrast: float = 20.0,
         layers: int | None = None,
         kinds: Sequence[str] | None = None,
-        textures: Sequence[NDArray[np.float32]] | None = None,
+        textures: Sequence[Pictures] | None = None,
         frame_rate_hz: float = 40_000.0,
     ) -> None:
         self.shape = checked_shape(shape)
@@ -109,11 +114,7 @@ class Collage:
         return {f"shape-{n}": layer.pose(frame, offset, self.shape)[:2] for n, layer in enumerate(self._shapes, 1)}
 
     def _paint(
-        self,
-        picture: NDArray[np.float32],
-        frame: float,
-        offset: tuple[float, float],
-        owner: NDArray[np.int32] | None = None,
+        self, picture: Pictures, frame: float, offset: tuple[float, float], owner: NDArray[np.int32] | None = None
     ) -> None:
         """The picture (H, W) at a frame, in place; owner (H, W): where that is given, which shape is seen."""
         self._background.tile(picture, frame, offset)
@@ -128,7 +129,7 @@ class Collage:
 class _Layer:
     """A premultiplied sprite (size, size, 2): light x coverage, and coverage; it turns about its middle."""
 
-    sprite: NDArray[np.float32]
+    sprite: Pictures
     radius: float
     centre: tuple[float, float]
     velocity: tuple[float, float]
@@ -149,14 +150,14 @@ class _Layer:
         ]
         return place[0], place[1], self.angle + self.spin * frame
 
-    def velocity_at(self, frame: float, offset: tuple[float, float], shape: tuple[int, int]) -> NDArray[np.float32]:
+    def velocity_at(self, frame: float, offset: tuple[float, float], shape: tuple[int, int]) -> Pictures:
         """(H, W, 2): velocity of this layer's surface in every pixel [pixels/frame], x then y."""
         x, y, _ = self.pose(frame, offset, shape)
         rows, columns = np.indices(shape)
         vx, vy = self.velocity[0] - self.spin * (rows - y), self.velocity[1] + self.spin * (columns - x)
         return np.stack([vx, vy], axis=-1).astype(np.float32)
 
-    def tile(self, picture: NDArray[np.float32], frame: float, offset: tuple[float, float]) -> None:
+    def tile(self, picture: Pictures, frame: float, offset: tuple[float, float]) -> None:
         """The sprite's light repeated over the whole picture, in place."""
         x = self.centre[0] + self.velocity[0] * frame - offset[0]
         y = self.centre[1] + self.velocity[1] * frame - offset[1]
@@ -164,12 +165,12 @@ class _Layer:
         _warp(self._light, matrix, (picture.shape[0], picture.shape[1]), cv2.BORDER_WRAP, picture)
 
     @cached_property
-    def _light(self) -> NDArray[np.float32]:
+    def _light(self) -> Pictures:
         return np.ascontiguousarray(self.sprite[..., 0])
 
     def shown(
         self, frame: float, offset: tuple[float, float], shape: tuple[int, int]
-    ) -> tuple[tuple[slice, slice], NDArray[np.float32]]:
+    ) -> tuple[tuple[slice, slice], Pictures]:
         """The rows and columns of the picture that the sprite may reach, and the sprite there, (h, w, 2)."""
         x, y, angle = self.pose(frame, offset, shape)
         reach = self.radius + 2
@@ -182,7 +183,7 @@ class _Layer:
             self.sprite, matrix, (bottom - top, right - left), cv2.BORDER_CONSTANT
         )
 
-    def _to_sprite(self, x: float, y: float, angle: float) -> NDArray[np.float64]:
+    def _to_sprite(self, x: float, y: float, angle: float) -> Floats:
         """2 x 3 map from picture (x, y) to sprite, whose middle is shown at (x, y)."""
         cos, sin = np.cos(angle) * self.zoom, np.sin(angle) * self.zoom
         middle = (len(self.sprite) - 1) / 2
@@ -190,7 +191,7 @@ class _Layer:
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _lay(picture: NDArray[np.float32], sprite: NDArray[np.float32]) -> None:
+def _lay(picture: Pictures, sprite: Pictures) -> None:
     """Lay a sprite (h, w, 2) over a picture (h, w), in place: out = light + (1 - coverage) x picture."""
     one = np.float32(1)
     for row in range(picture.shape[0]):
@@ -199,13 +200,9 @@ def _lay(picture: NDArray[np.float32], sprite: NDArray[np.float32]) -> None:
 
 
 def _warp(
-    image: NDArray[np.float32],
-    matrix: NDArray[np.float64],
-    shape: tuple[int, int],
-    border: int,
-    into: NDArray[np.float32] | None = None,
-) -> NDArray[np.float32]:
-    """The image at matrix (x, y, 1) for every pixel (x, y) of a picture of `shape`, bilinear; into: such a picture."""
+    image: Pictures, matrix: Floats, shape: tuple[int, int], border: int, into: Pictures | None = None
+) -> Pictures:
+    """The image at matrix (x, y, 1) for every pixel (x, y) of a picture of `shape`, bilinear; `into` is overwritten."""
     flags = cv2.INTER_LINEAR | cv2.WARP_INVERSE_MAP
     return np.asarray(cv2.warpAffine(image, matrix, shape[::-1], into, flags, border), np.float32)
 
@@ -216,7 +213,7 @@ def _draw_layer(
     speed: float,
     contrast: float,
     kinds: Sequence[str] | None,
-    textures: Sequence[NDArray[np.float32]] | None,
+    textures: Sequence[Pictures] | None,
     background: bool,
 ) -> _Layer:
     texture = random_texture(rng, 256, kinds) if textures is None else textures[int(rng.integers(len(textures)))]
@@ -241,14 +238,14 @@ def _draw_layer(
     return _Layer(np.stack([filled, mask], axis=-1), radius, centre, velocity, angle, spin, 1.0)
 
 
-def _fill(grey: NDArray[np.float32], size: int, rng: np.random.Generator, zoom: float) -> NDArray[np.float32]:
+def _fill(grey: Pictures, size: int, rng: np.random.Generator, zoom: float) -> Pictures:
     """A (size, size) piece of the texture, magnified by 1 / zoom, repeated where it ends."""
     x, y = rng.uniform(0, len(grey), 2)
     matrix = np.array([[zoom, 0, x], [0, zoom, y]])
     return _warp(grey, matrix, (size, size), cv2.BORDER_WRAP)
 
 
-def _mask(kind: str, half_width: float, half_height: float, blades: int) -> NDArray[np.float32]:
+def _mask(kind: str, half_width: float, half_height: float, blades: int) -> Pictures:
     """Coverage of a shape in its sprite, from the signed distance to its edge [pixels]."""
     reach = float(np.hypot(half_width, half_height)) if kind == "rectangle" else max(half_width, half_height)
     size = 2 * int(np.ceil(reach + 2))

@@ -11,13 +11,13 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
 from scenes.keys import interval_for, key_frames
-from scenes.painted_disk import Texels
-from scenes.planes import Laid, PlanarScene, Plane, painted_planes
+from scenes.painted_disk import PlacedDisc, Plane, Texels
+from scenes.planes import PlanarScene, painted_planes
 from scenes.protocol import Gaze, Truth
 from spikecam_env.compiled import njit
+from spikecam_env.types import Floats, Pictures
 
 MOTION_PER_KEY = 0.6
 """Most that anything moves between two keys [pixels], as of `scenes.disk`: 1.2 % rms of a frame's light."""
@@ -27,18 +27,16 @@ _AT_REST = Gaze.fixed(0.0, 0.0)
 
 @dataclass(frozen=True, eq=False)
 class PiecewisePath:
-    """Straight pieces from place to place; at rest before the first and after the last.
+    """Straight pieces from place to place; at rest before the first and after the last."""
 
-    frame  (n,) rising [frames]
-    place  (n, 2) x, y [pixels]
-    """
-
-    frame: NDArray[np.float64]
-    place: NDArray[np.float64]
+    frame: Floats
+    """(n,) rising [frames]."""
+    place: Floats
+    """(n, 2) x, y [pixels]."""
 
     @classmethod
     def still(cls, x: float, y: float) -> PiecewisePath:
-        """Always there."""
+        """At rest at one place."""
         return cls(np.zeros(1), np.array([[x, y]], np.float64))
 
     @classmethod
@@ -52,9 +50,9 @@ class PiecewisePath:
         when = float(frame)
         return _at(when, self.frame, self.place, 0), _at(when, self.frame, self.place, 1)
 
-    def along(self, frames: NDArray[np.float64]) -> NDArray[np.float64]:
+    def along(self, frames: Floats) -> Floats:
         """x, y (2, K) at frames (K,) [pixels]."""
-        places: NDArray[np.float64] = _along(frames, self.frame, self.place)
+        places: Floats = _along(frames, self.frame, self.place)
         return places
 
     def velocity(self, frame: float) -> tuple[float, float]:
@@ -93,18 +91,15 @@ class Disc:
 class Discs(PlanarScene):
     """Scene: see the head of this file.
 
-    shape          (rows, columns)
-    frame_rate_hz  frames a second
-    tile           (h, w) float32 radiance of the background, repeated; its first texel is pixel (0, 0)
-    discs          by name, from the back
-
     Truth: object n is the n-th disc; poses[name] is (x, y, angle).
     """
 
     shape: tuple[int, int]
     frame_rate_hz: float
-    tile: NDArray[np.float32]
+    tile: Pictures
+    """(h, w) float32 radiance of the background, repeated; its first texel is pixel (0, 0)."""
     discs: dict[str, Disc]
+    """By name, from the back."""
 
     def plane(self, start: int, stop: int, gaze: Gaze | None = None) -> Plane:
         """See `PlanarScene`."""
@@ -147,29 +142,29 @@ class Discs(PlanarScene):
         (x, y), (pan, tilt) = disc.path.at(frame), gaze.at(frame)
         return x - pan, y - tilt
 
-    def _at(self, frame: NDArray[np.float64], gaze: Gaze) -> Plane:
-        """What is seen at these frames (K,)."""
+    def _at(self, frame: Floats, gaze: Gaze) -> Plane:
+        """The plane at these frames (K,)."""
         pan, tilt = gaze.at(frame)
         laid = []
         for disc in self.discs.values():
             x, y = disc.path.along(frame)
             angle = disc.angle + disc.turn(self.frame_rate_hz) * frame
-            laid.append(Laid(disc.texels, disc.radius, x - pan, y - tilt, angle))
+            laid.append(PlacedDisc(disc.texels, disc.radius, x - pan, y - tilt, angle))
         return Plane(self.shape, frame, self.tile, pan, tilt, laid)
 
 
 @njit(cache=True, nogil=True)
-def _along(frames: NDArray[np.float64], knots: NDArray[np.float64], places: NDArray[np.float64]) -> NDArray[np.float64]:
+def _along(frames: Floats, knots: Floats, places: Floats) -> Floats:
     """`_at` of both axes at each of frames (K,)."""
-    found = np.empty((2, len(frames)))
+    places_at = np.empty((2, len(frames)))
     for k in range(len(frames)):
         for axis in range(2):
-            found[axis, k] = _at(frames[k], knots, places, axis)
-    return found
+            places_at[axis, k] = _at(frames[k], knots, places, axis)
+    return places_at
 
 
 @njit(cache=True, nogil=True)
-def _at(frame: float, knots: NDArray[np.float64], places: NDArray[np.float64], axis: int) -> float:
+def _at(frame: float, knots: Floats, places: Floats, axis: int) -> float:
     """As `np.interp` of a column of places (n, 2) given at knots (n,)."""
     after = np.searchsorted(knots, frame, side="right")
     if after == 0 or after == len(knots):

@@ -1,8 +1,8 @@
 """A rotating textured disk: the fast scene with a closed-form truth.
 
     angle(t) = angle(0) + w t,  w = 2 pi rpm / (60 frame_rate_hz)      [radians, radians/frame]
-    flow inside the disk  = w (dy, -dx) + drift - gaze rate             [pixels/frame]
-    flow outside the disk = - gaze rate
+    flow inside the disk: w (dy, -dx) + drift - gaze rate             [pixels/frame]
+    flow outside the disk: - gaze rate
 
 (dx, dy) is the offset from the disk's centre, y down; w > 0 turns counter-clockwise in the picture.  At
 2000 rpm and 40 kHz the rim of a disk of radius 110 moves 0.58 pixels a frame.
@@ -20,11 +20,11 @@ from typing import Any
 import cv2
 import numpy as np
 import scipy
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from scenes.keys import interval_for, key_frames
-from scenes.painted_disk import Texels, paint_tile, prefiltered
-from scenes.planes import Laid, PlanarScene, Plane, painted_planes
+from scenes.painted_disk import PlacedDisc, Plane, Texels, paint_tile, prefiltered
+from scenes.planes import PlanarScene, painted_planes
 from scenes.protocol import FRAME_RATES_HZ, MOST_LIGHT, MOST_PLACE, Gaze, Truth
 from scenes.textures import Texture, dead_leaves, fractal_noise
 from spikecam_env.checked import (
@@ -35,6 +35,7 @@ from spikecam_env.checked import (
     checked_shape,
 )
 from spikecam_env.errors import InputError
+from spikecam_env.types import Floats, Pictures
 
 MOST_RADIUS = 6000.0
 """[pixels] Texels are counted in 32 bits, TEXELS_PER_PIXEL^2 of them to a pixel of the disk's square."""
@@ -56,28 +57,32 @@ _RANGES = {
 class RotatingDisk(PlanarScene):
     """A disk that spins and drifts over a background.
 
-    shape           (rows, columns) of the sensor
-    rpm             turns a minute; positive is counter-clockwise, 0 stands still
-    radius          [pixels]; default 0.44 of the shorter side (110 at 250 x 400)
-    light           radiance of texture value 0 and 1, linear: (dark, bright)
-    texture         (n, n) in [0, 1], the square around the disk; default `disk_texture` from the seed
-    background      a radiance, or a tile of radiance (one texel a pixel, repeated); default soft noise
-    seed            of the default texture and background
-    frame_rate_hz   frames a second
-    centre          (x, y) of the disk at frame 0 [pixels]; default the middle of the picture
-    drift_px_s      (x, y) velocity of the disk's centre [pixels/s]
-    angle           at frame 0 [radians]
-    motion_per_key  most the rim may move between two keys [pixels], as far as whole frames allow; the sensor blends
-                    two keys.  `spikecam bench scenes` prints what that costs: the light of a frame is 1.2 % rms off
-                    at 0.58 pixels a key (2000 rpm), 3.1 % at twice that
-
     Truth: object 1 is the disk; poses["disk"] is (x, y, angle) with the angle in [0, 2 pi).
-    Errors: InputError for a value out of range, by name.
 
-    >>> scene = RotatingDisk((16, 24), rpm=2000.0)
-    >>> truth = scene.truth(0.5)
-    >>> truth.radiance.shape, list(truth.poses)
-    ((16, 24), ['disk', 'camera'])
+    Args:
+        shape: (rows, columns) of the sensor.
+        rpm: turns a minute; positive is counter-clockwise, 0 stands still.
+        radius: [pixels]; default 0.44 of the shorter side (110 at 250 x 400).
+        light: radiance of texture value 0 and 1, linear: (dark, bright).
+        texture: (n, n) in [0, 1], the square around the disk; default `disk_texture` from the seed.
+        background: a radiance, or a tile of radiance (one texel a pixel, repeated); default soft noise.
+        seed: of the default texture and background.
+        frame_rate_hz: frames a second.
+        centre: (x, y) of the disk at frame 0 [pixels]; default the middle of the picture.
+        drift_px_s: (x, y) velocity of the disk's centre [pixels/s].
+        angle: at frame 0 [radians].
+        motion_per_key: most the rim may move between two keys [pixels], as far as whole frames allow; the sensor blends
+            two keys.  The light of a frame is 1.2 % rms off at 0.58 pixels a key (2000 rpm), 3.1 % at twice that
+            (`spikecam bench scenes`).
+
+    Raises:
+        InputError: a value is out of range, by name.
+
+    Example:
+        >>> scene = RotatingDisk((16, 24), rpm=2000.0)
+        >>> truth = scene.truth(0.5)
+        >>> truth.radiance.shape, list(truth.poses)
+        ((16, 24), ['disk', 'camera'])
     """
 
     def __init__(
@@ -190,10 +195,10 @@ class RotatingDisk(PlanarScene):
         moving = self.rim_speed + float(np.hypot(*self.drift_px_s)) / self.frame_rate_hz
         return moving + (float(np.hypot(*gaze.rate)) if gaze else 0.0)
 
-    def _at(self, frame: NDArray[np.float64], gaze: Gaze) -> Plane:
-        """What is seen at these frames (K,)."""
+    def _at(self, frame: Floats, gaze: Gaze) -> Plane:
+        """The plane at these frames (K,)."""
         x, y = np.clip(self.centre_at(frame, gaze), -MOST_PLACE, MOST_PLACE)
-        disk = Laid(self._disk, self.radius, x, y, self.angle_at(frame))
+        disk = PlacedDisc(self._disk, self.radius, x, y, self.angle_at(frame))
         return Plane(self.shape, frame, self._tile, *gaze.at(frame), [disk], self._background)
 
 
@@ -239,15 +244,13 @@ def disk_texture(rng: np.random.Generator, size: int = 1024) -> Texture:
 _AT_REST = Gaze.fixed(0.0, 0.0)
 
 
-def _sectors(turn: NDArray[np.float32], count: int) -> NDArray[np.float32]:
+def _sectors(turn: Pictures, count: int) -> Pictures:
     """Alternating 0 and 1, `count` of them in a turn."""
-    sectors: NDArray[np.float32] = np.floor(turn * count) % 2
+    sectors: Pictures = np.floor(turn * count) % 2
     return sectors
 
 
-def _round_text(
-    text: str, turn: NDArray[np.float32], radius: NDArray[np.float32], inner: float, outer: float
-) -> NDArray[np.float32]:
+def _round_text(text: str, turn: Pictures, radius: Pictures, inner: float, outer: float) -> Pictures:
     """Text around a ring, tops outward, clockwise, as wide as the ring; white on black."""
     (width, _), _ = cv2.getTextSize(text, cv2.FONT_HERSHEY_DUPLEX, 4.0, 12)
     height = 140
@@ -255,20 +258,17 @@ def _round_text(
     cv2.putText(strip, text, (0, 114), cv2.FONT_HERSHEY_DUPLEX, 4.0, 255, 12, cv2.LINE_AA)
     across = (outer - radius) / np.float32(outer - inner) * height
     ring = cv2.remap(strip, turn * width, across, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
-    white: NDArray[np.float32] = ring / np.float32(255)
+    white: Pictures = ring / np.float32(255)
     return white
 
 
 def _background_tile(
-    background: float | ArrayLike | None,
-    rng: np.random.Generator,
-    shape: tuple[int, int],
-    light: tuple[float, float],
-) -> NDArray[np.float32]:
+    background: float | ArrayLike | None, rng: np.random.Generator, shape: tuple[int, int], light: tuple[float, float]
+) -> Pictures:
     """(h, w) float32 radiance, to be repeated."""
     if background is None:
         noise = scipy.ndimage.gaussian_filter(fractal_noise(rng, 2 * (max(shape) // 2) + 64), 1.0, mode="wrap")
-        cloudy: NDArray[np.float32] = np.float32(light[0]) + np.float32(0.4 * (light[1] - light[0])) * noise
+        cloudy: Pictures = np.float32(light[0]) + np.float32(0.4 * (light[1] - light[0])) * noise
         return cloudy
     tile = np.atleast_2d(np.asarray(background, np.float32))
     if tile.ndim != 2 or not tile.size or not np.isfinite(tile).all() or tile.min() < 0:
@@ -276,7 +276,7 @@ def _background_tile(
     return np.ascontiguousarray(tile)
 
 
-def _checked_texture(texture: ArrayLike) -> NDArray[np.float32]:
+def _checked_texture(texture: ArrayLike) -> Pictures:
     values = np.asarray(texture, np.float32)
     if values.ndim != 2 or values.shape[0] != values.shape[1] or len(values) < 2:
         raise InputError(f"texture has shape {values.shape}; it must be square, (n, n) with n at least 2")

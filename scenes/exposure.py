@@ -12,8 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from scenes.derived import Derived
-from scenes.protocol import Dimmable, Gaze, Placed, Scene, Truth
+from scenes.protocol import Derived, Dimmable, Gaze, Placed, Scene, Truth
 from spikecam_env.checked import checked_number
 from spikecam_env.errors import InputError
 from spikecam_env.sensor import Keyframes
@@ -28,12 +27,16 @@ MOST_INTERVAL = 1e6
 def expose(scene: Scene, mean_interval: float = 10.0, metered: Scene | None = None) -> Scene:
     """The scene with its light scaled to a mean interval [frames].
 
-    metered   measure this one instead, e.g. the same scene at a smaller shape
-    Errors: InputError for an interval below 1 (a pixel fires at most once a frame) or a scene without light.
+    Args:
+        metered: measure this one instead, e.g. the same scene at a smaller shape.
 
-    >>> from scenes.disk import RotatingDisk
-    >>> round(1.0 / float(expose(RotatingDisk((16, 24)), mean_interval=20.0).truth(0.5).radiance.mean()))
-    20
+    Raises:
+        InputError: the interval is below 1 (a pixel fires at most once a frame), or the scene has no light.
+
+    Example:
+        >>> from scenes.disk import RotatingDisk
+        >>> round(1.0 / float(expose(RotatingDisk((16, 24)), mean_interval=20.0).truth(0.5).radiance.mean()))
+        20
     """
     checked_interval(mean_interval)
     mean = float(np.mean([(metered or scene).truth(frame).radiance.mean() for frame in METERED_FRAMES]))
@@ -45,10 +48,11 @@ def expose(scene: Scene, mean_interval: float = 10.0, metered: Scene | None = No
 def lit(scene: Scene, gain: float) -> Scene:
     """The scene with `gain` times its light.
 
-    >>> from scenes.disk import RotatingDisk
-    >>> scene = RotatingDisk((16, 24))
-    >>> round(float(lit(scene, 0.5).truth(0.5).radiance.mean() / scene.truth(0.5).radiance.mean()), 3)
-    0.5
+    Example:
+        >>> from scenes.disk import RotatingDisk
+        >>> scene = RotatingDisk((16, 24))
+        >>> round(float(lit(scene, 0.5).truth(0.5).radiance.mean() / scene.truth(0.5).radiance.mean()), 3)
+        0.5
     """
     if gain == 1.0:
         return scene
@@ -56,10 +60,14 @@ def lit(scene: Scene, gain: float) -> Scene:
 
 
 def checked_interval(mean_interval: float) -> float:
-    """The interval as it is; raises InputError unless it is from 1 to MOST_INTERVAL frames.
+    """The interval as it is.
 
-    >>> checked_interval(10.0)
-    10.0
+    Raises:
+        InputError: it is not from 1 to MOST_INTERVAL frames.
+
+    Example:
+        >>> checked_interval(10.0)
+        10.0
     """
     return checked_number(mean_interval, "mean_interval", 1.0, MOST_INTERVAL, unit="frames, e.g. 10")
 
@@ -68,10 +76,11 @@ def checked_interval(mean_interval: float) -> float:
 class Exposed(Derived):
     """Scene: another one with its light multiplied by `gain`.
 
-    >>> from scenes.collage import Collage
-    >>> scene = Collage((16, 24))
-    >>> float(Exposed(scene, 0.5).truth(0.5).radiance.max() / scene.truth(0.5).radiance.max())
-    0.5
+    Example:
+        >>> from scenes.collage import Collage
+        >>> scene = Collage((16, 24))
+        >>> float(Exposed(scene, 0.5).truth(0.5).radiance.max() / scene.truth(0.5).radiance.max())
+        0.5
     """
 
     scene: Scene

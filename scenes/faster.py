@@ -8,9 +8,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from scenes.derived import Derived
 from scenes.exposure import METERED_FRAMES
-from scenes.protocol import Gaze, Scene, Truth
+from scenes.protocol import Derived, Gaze, Scene, Truth
 from spikecam_env.checked import checked_number
 from spikecam_env.errors import InputError
 from spikecam_env.sensor import Keyframes
@@ -18,7 +17,7 @@ from spikecam_env.sensor import Keyframes
 MOVES = 0.01
 """Slowest that counts as motion [pixels/frame]: a pixel in 100 frames, the longest window of a picture."""
 QUICK = 0.9
-"""The scene's speed is this quantile of the speeds of what moves."""
+"""The scene's speed is this quantile of the speeds of moving pixels."""
 MOST_FACTOR = 1e3
 """From the slowest of the catalogue to 10 pixels a frame."""
 
@@ -28,7 +27,10 @@ class Faster(Derived):
     """Scene: another one's light; frame t is its frame `factor` * t.
 
     Keys lie at fractions of frames; a frame with keys inside it costs the sensor a pass.
-    Errors: InputError for a factor that is not above 0 and at most MOST_FACTOR; a gaze is refused.
+    A gaze is refused.
+
+    Raises:
+        InputError: the factor is not above 0 and at most MOST_FACTOR.
     """
 
     scene: Scene
@@ -51,10 +53,8 @@ class Faster(Derived):
 
 
 def speed_of(scene: Scene) -> float:
-    """Speed of a scene [pixels/frame]: the QUICK quantile over pixels that move, the median over METERED_FRAMES.
-
-    0 where nothing moves.
-    """
+    """Speed of a scene [pixels/frame]: the QUICK quantile over moving pixels, the median over METERED_FRAMES; 0
+    where nothing moves."""
     speeds = []
     for frame in METERED_FRAMES:
         speed = np.linalg.norm(scene.truth(frame).flow, axis=-1)
@@ -66,7 +66,8 @@ def speed_of(scene: Scene) -> float:
 def at_speed(scene: Scene, speed: float) -> Scene:
     """The scene in as much faster (or slower) motion as makes its speed so many pixels a frame.
 
-    Errors: InputError for a scene in which nothing moves.
+    Raises:
+        InputError: nothing moves in the scene.
     """
     own = speed_of(scene)
     if not own > 0:

@@ -26,11 +26,11 @@ from scenes.pictures import check_size, pictures_in, pictures_timed, read_pictur
 from scenes.transfer import grey, light_of
 from spikecam_env.errors import InputError
 from spikecam_env.renamed import old_names
-from spikecam_env.types import Pictures
+from spikecam_env.types import Floats, Pictures
 from spikecam_env.untrusted import existing_file
 
 UNSTATED_TRANSFER = "gamma2.2"
-"""Of a video file of 8 bits that states none: what screens have."""
+"""Of a video file of 8 bits that states none: that of screens."""
 MOST_BYTES = 1 << 33
 """Of a film's light in memory: 20 000 pictures of 250 x 400."""
 NOT_VIDEO = ("tty", "hls", "concat", "dash")
@@ -39,76 +39,74 @@ NOT_VIDEO = ("tty", "hls", "concat", "dash")
 
 @dataclass(frozen=True)
 class FilmOptions:
-    """How a film is to be read.
-
-    shape         (rows, columns) to which each picture is cut and averaged; None: as they are
-    transfer      a name of `scenes.transfer`; None: what the file states
-    channel       "luminance", "red", "green" or "blue"
-    film_rate_hz  pictures a second when it was taken; None: by time stamps
-    times_s       (T,) a time for every picture; None: by time stamps
-    slow          the file plays so many times slower than life
-    most          pictures; None: all
-    seconds       of the film's true time to be read; None: all
-    """
+    """How a film is to be read."""
 
     shape: tuple[int, int] | None = None
+    """(rows, columns) to which each picture is cut and averaged; None: as they are."""
     transfer: str | None = None
+    """A name of `scenes.transfer`; None: that of the file."""
     channel: str = "luminance"
+    """"luminance", "red", "green" or "blue"."""
     film_rate_hz: float | None = None
-    times_s: NDArray[np.float64] | None = None
+    """Pictures a second when it was taken; None: by time stamps."""
+    times_s: Floats | None = None
+    """(T,) a time for every picture; None: by time stamps."""
     slow: float = 1.0
+    """The file plays so many times slower than life."""
     most: int | None = None
+    """Pictures; None: all."""
     seconds: float | None = None
+    """Of the film's true time to be read; None: all."""
 
 
 @dataclass(frozen=True)
 class Film:
-    """What was read.
-
-    light     T pictures (h, w), linear
-    time_s    (T,) of each from the first
-    rate_hz   pictures a second where that is constant
-    last_s    for how long the last one is seen
-    transfer  by which it was decoded
-    bits      of a value
-    """
+    """The pictures of a film, linear, with their times."""
 
     light: list[Pictures]
-    time_s: NDArray[np.float64]
+    """T pictures (h, w), linear."""
+    time_s: Floats
+    """(T,) of each from the first."""
     rate_hz: float | None
+    """Pictures a second where that is constant."""
     last_s: float
+    """For how long the last one is seen."""
     transfer: str
+    """By which it was decoded."""
     bits: int
+    """Of a value."""
 
 
 @dataclass
 class _Source:
-    """Pictures as they come, and what is known of them beforehand.
-
-    pictures    of each, its values and its time [s], None where the source has none
-    rate        pictures a second that the time stamps are multiples of; stamps are rounded to tick_s
-    count       pictures that the file states, duration_s likewise; None where it does not
-    transfer    of what states none; None: there is no custom
-    trouble     why reading ended early
-    last_s      for how long the last picture is seen
-    """
+    """Pictures as they come, and facts about them that are known beforehand."""
 
     pictures: Iterator[tuple[StoredPicture, Fraction | float | None]]
+    """Of each, its values and its time [s], None where the source has none."""
     rate: Fraction | None = None
+    """Pictures a second that the time stamps are multiples of."""
     tick_s: Fraction = Fraction(0)
+    """To which time stamps are rounded [s]."""
     count: int | None = None
+    """Pictures, as the file states them."""
     duration_s: float | None = None
+    """As the file states it [s]."""
     transfer: str | None = None
+    """Of pictures that state none; None: there is no custom."""
     trouble: str = ""
+    """Why reading ended early."""
     last_s: float | None = None
+    """For how long the last picture is seen."""
 
 
 def read_film(path: str | PathLike[str], how: FilmOptions) -> Film:
     """The film in a file or folder.
 
     Warns where a file holds fewer pictures than it states, and where it states no transfer.
-    Errors: InputError for a file that is no film, fewer than two pictures, pictures of several sizes, time stamps that
-    are missing or do not rise, a transfer that is unknown, or not stated for values of more than 8 bits.
+
+    Raises:
+        InputError: the file is no film, or has fewer than two pictures or pictures of several sizes.  Time stamps are
+            missing or do not rise.  The transfer is unknown, or not stated for values of more than 8 bits.
     """
     where = str(path)
     light: list[Pictures] = []
@@ -150,7 +148,11 @@ def read_film(path: str | PathLike[str], how: FilmOptions) -> Film:
 
 
 def read_array(path: str | PathLike[str]) -> NDArray[Any]:
-    """The array of an .npy file, read from disk as it is used.  Errors: InputError where it is none, or damaged."""
+    """The array of an .npy file, read from disk as it is used.
+
+    Raises:
+        InputError: the file is not of this kind, or is damaged.
+    """
     try:
         return np.load(existing_file(Path(path)), mmap_mode="r", allow_pickle=False)  # type: ignore[no-any-return]
     except InputError:
@@ -267,7 +269,7 @@ def _duration(container: Any, stream: Any) -> float | None:
     return container.duration / av.time_base if container.duration and len(container.streams) == 1 else None
 
 
-# -- what they mean --------------------------------------------------------------------------------------------
+# -- times and transfer --------------------------------------------------------------------------------------------
 
 
 def _transfer(picture: StoredPicture, how: FilmOptions, source: _Source, where: str) -> str:
@@ -310,9 +312,7 @@ def _past(stamps: list[Any], how: FilmOptions) -> bool:
     return float(stamps[-1] - stamps[0]) / how.slow >= how.seconds
 
 
-def _times(
-    stamps: list[Any], source: _Source, how: FilmOptions, where: str
-) -> tuple[NDArray[np.float64], float | None]:
+def _times(stamps: list[Any], source: _Source, how: FilmOptions, where: str) -> tuple[Floats, float | None]:
     """Of the pictures, from the first [s]; and pictures a second where that is constant."""
     if how.film_rate_hz is not None:
         return np.arange(len(stamps)) / how.film_rate_hz, how.film_rate_hz
@@ -340,10 +340,11 @@ def _is_tick(stamp: Any, time: Any, tick_s: Fraction) -> bool:
     return bool(stamp == time or abs(stamp - time) < tick_s)
 
 
-def given_times(times_s: NDArray[np.float64], pictures: int, how: FilmOptions, where: str) -> NDArray[np.float64]:
+def given_times(times_s: Floats, pictures: int, how: FilmOptions, where: str) -> Floats:
     """The user's times of so many pictures, from the first [s].
 
-    Errors: InputError where there is not one for each, or they are not finite and rising.
+    Raises:
+        InputError: a picture has no time, or times are not finite and rising.
     """
     times = np.asarray(times_s, np.float64)
     cut = how.most is not None or how.seconds is not None

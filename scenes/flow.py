@@ -1,9 +1,9 @@
 """Is the flow right?  Light carried along it must be the light that is there later.
 
-Only the truth of the scene is asked, step by step, as any user of its flow would.  What is carried comes to lie between
-pixels, and no interpolation of pixels tells the light there: a pixel's area lets detail of two pixels' width and less
-through, which its grid cannot hold.  So the later picture is taken `FINER` x `FINER` times, the camera turned by parts
-of a pixel, and the light that a pixel would have at the place is read from those.
+The check uses the truth of the scene alone, step by step.  Points come to lie between pixels, and no interpolation of
+pixels gives the light there: a pixel's area passes detail of two pixels' width and less, which its grid cannot hold.
+So the later picture is taken `FINER` x `FINER` times, the camera turned by parts of a pixel.  The light of a pixel at
+the place is read from those.
 """
 
 from __future__ import annotations
@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scenes.protocol import Gaze, Scene, Truth
+from spikecam_env.types import Masks, Pictures
 
 STEP = 5
 """Frames that a point is carried on at a time, by the flow at the middle of them."""
@@ -26,29 +27,29 @@ FINER = 2
 """Pictures a pixel, along either side.  A pixel's area lets next to nothing through that these do not hold."""
 
 SHADE_BLUR = 8.0
-"""Pixels, standard deviation: wide beside what a texture shows, narrow beside how shade falls on a body."""
+"""Pixels, standard deviation: wide beside the detail of a texture, narrow beside shade on a body."""
 
 Places = NDArray[np.floating]
 
 
 @dataclass(frozen=True)
 class FlowCheck:
-    """error: rms of what came along the flow against what is there, share of full scale (the brightest light).
-    shade_aside: the same once what turned in the light is given its new shade, taken as smooth over `SHADE_BLUR` within
-    an object.  from_pixels: had the light been interpolated from one later picture.  unmoved: had nothing been moved.
-    compared: share of the picture that was: the rest left the picture, was covered, or lies beside an object's edge.
-    """
+    """Error of the flow, rms as a share of full scale (the brightest light)."""
 
     error: float
+    """Of light that is carried along the flow, against the later light at its place."""
     shade_aside: float
+    """The same with the new shade, taken as smooth over `SHADE_BLUR` within an object."""
     from_pixels: float
+    """The same against light that is interpolated from one later picture."""
     unmoved: float
+    """Of light that is not carried."""
     compared: float
+    """Share of the picture; the rest left it, was covered, or lies beside an object's edge."""
 
 
 def check_flow(scene: Scene, frame: float = 100, frames: int = 40, gaze: Gaze | None = None) -> FlowCheck:
-    """Carry every point of the picture at `frame` along the flow for so many frames, and compare its light with that of
-    a pixel at the place where it comes to."""
+    """Carry every point of a picture along the flow for so many frames; compare its light with that at its place."""
     y, x = np.indices(scene.shape).astype(np.float32)
     first = scene.truth(frame, gaze)
     alone, at = _alone(first), first
@@ -72,7 +73,7 @@ def check_flow(scene: Scene, frame: float = 100, frames: int = 40, gaze: Gaze | 
     return FlowCheck(**errors, compared=float(alone.mean()))
 
 
-def _finer(scene: Scene, frame: float, gaze: Gaze | None) -> NDArray[np.float32]:
+def _finer(scene: Scene, frame: float, gaze: Gaze | None) -> Pictures:
     """The light of a pixel at every place of a grid `FINER` times as fine, (FINER H, FINER W)."""
     rows, columns = scene.shape
     light = np.empty((FINER * rows, FINER * columns), np.float32)
@@ -88,9 +89,7 @@ def _turned(gaze: Gaze, pan: float, tilt: float) -> Gaze:
     return Gaze((p + pan, q + tilt), (r + pan, s + tilt), gaze.frames)
 
 
-def _shade(
-    before: NDArray[np.float32], after: NDArray[np.float32], owner: NDArray[np.int32], compared: NDArray[np.bool_]
-) -> NDArray[np.float32]:
+def _shade(before: Pictures, after: Pictures, owner: NDArray[np.int32], compared: Masks) -> Pictures:
     """Smooth ratio of both within each object: light about a pixel afterwards, over light about it before."""
     ratio = np.ones_like(before)
     for number in np.unique(owner[compared]):
@@ -100,7 +99,7 @@ def _shade(
     return ratio
 
 
-def _alone(truth: Truth) -> NDArray[np.bool_]:
+def _alone(truth: Truth) -> Masks:
     """Pixels with one object only about them."""
     square, owner = np.ones((NEAR, NEAR), np.uint8), truth.object_id.astype(np.int16)
     return np.asarray(cv2.erode(owner, square) == cv2.dilate(owner, square))
@@ -112,12 +111,12 @@ def _alone_at(truth: Truth, x: Places, y: Places) -> NDArray[np.int32]:
     return _read(owner, x, y, cv2.INTER_NEAREST).astype(np.int32)
 
 
-def _inside(x: Places, y: Places, shape: tuple[int, int]) -> NDArray[np.bool_]:
+def _inside(x: Places, y: Places, shape: tuple[int, int]) -> Masks:
     """Far enough from the border to read about a place."""
     return (x >= 2) & (x <= shape[1] - 3) & (y >= 2) & (y <= shape[0] - 3)
 
 
-def _read(picture: NDArray[np.float32], x: Places, y: Places, how: int) -> NDArray[np.float32]:
+def _read(picture: Pictures, x: Places, y: Places, how: int) -> Pictures:
     places = x.astype(np.float32), y.astype(np.float32)
     return np.asarray(cv2.remap(picture, *places, how, borderMode=cv2.BORDER_REPLICATE), np.float32)
 

@@ -1,9 +1,9 @@
-"""What FFmpeg decodes, as numbers: the values of a picture at full depth, and what the file says they mean.
+"""Decoded frames of FFmpeg as numbers: values at full depth, with their meaning as the file states it.
 
-    values = code / full scale                    RGB, grey, and YUV of full range
-    Y = (code - 16 s) / 219 s                     limited range, s = 2^(bits - 8)
-    C = (code - 128 s) / 224 s                    its colour differences Cb, Cr
-    R = Y + 2 (1 - kr) Cr,  B = Y + 2 (1 - kb) Cb,  G = (Y - kr R - kb B) / (1 - kr - kb)
+    values = code / full scale;                   RGB, grey, and YUV of full range
+    Y = (code - 16 s) / 219 s;                    limited range, s = 2^(bits - 8)
+    C = (code - 128 s) / 224 s;                   its colour differences Cb, Cr
+    R = Y + 2 (1 - kr) Cr;  B = Y + 2 (1 - kb) Cb;  G = (Y - kr R - kb B) / (1 - kr - kb)
 
 Source: ITU-T H.273 (matrices, ranges, and the numbers by which files name matrix, transfer and primaries).
 """
@@ -37,7 +37,7 @@ STATED_TRANSFERS = {
 UNSTATED = (0, 2)
 """Numbers that say nothing; H.273 has 2, and some files 0."""
 STATED_PRIMARIES = {5: "bt470bg", 6: "smpte170m", 7: "smpte170m", 9: "bt2020", 12: "smpte432"}
-"""Primaries by their number in H.273; what is not here is taken as BT.709's."""
+"""Primaries by their number in H.273; others are taken as BT.709's."""
 MATRICES = {
     1: (0.2126, 0.0722),
     4: (0.30, 0.11),
@@ -53,25 +53,24 @@ HIGH_DEFINITION = 720
 
 @dataclass(frozen=True)
 class StoredPicture:
-    """A picture as a file stores it.
-
-    values     (h, w) or (h, w, 3: red, green, blue) float32; 0..1 of full scale, or floats as they are
-    transfer   as `scenes.transfer` names it; None where the file does not say
-    primaries  likewise, in `LUMINANCE`
-    bits       of a value; 32 for floats
-    """
+    """A picture as a file stores it."""
 
     values: Pictures
+    """(h, w) or (h, w, 3: red, green, blue) float32; 0..1 of full scale, or floats as they are."""
     transfer: str | None
+    """As `scenes.transfer` names it; None where the file does not say."""
     primaries: str
+    """Likewise, in `LUMINANCE`."""
     bits: int
+    """Of a value; 32 for floats."""
 
 
 def stored(frame: VideoFrame, where: str, turned: bool = True) -> StoredPicture:
     """A decoded frame as numbers, turned upright as the file says unless `turned` is false.
 
-    Errors: InputError, which begins with `where`, for two fields in one frame, transparent pixels, and for a format
-    or matrix that is not read here.
+    Raises:
+        InputError: the frame has two fields or transparent pixels, or its format or matrix is not read here.  The
+            message begins with `where`.
     """
     if frame.interlaced_frame:
         raise InputError(

@@ -4,39 +4,36 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from scenes.derived import Derived
-from scenes.protocol import Gaze, Placed, Truth
+from scenes.protocol import Derived, Gaze, Placed, Truth
 from spikecam_env.sensor import Keyframes
 
 
 @dataclass(frozen=True)
 class Later(Derived):
-    """Scene: another one's light, frame 0 being its frame `frames`, a camera at rest being one at `offset`.
-
-    frames   whole frames
-    offset   (pan, tilt) [pixels]
-    drift    (pan, tilt) velocity of the mount that the camera is on [pixels/frame]; the offset is at frame 0
-    """
+    """Scene: another one's light, frame 0 being its frame `frames`, a camera at rest being one at `offset`."""
 
     scene: Placed
     frames: int = 0
+    """Whole frames."""
     offset: tuple[float, float] = (0.0, 0.0)
+    """(pan, tilt) [pixels]."""
     drift: tuple[float, float] = (0.0, 0.0)
+    """(pan, tilt) velocity of the mount that the camera is on [pixels/frame]; the offset is at frame 0."""
 
     def radiance(self, start: int, stop: int, gaze: Gaze | None = None) -> Keyframes:
         """The scene's keys, at their frames here."""
-        keys = self.scene.radiance(start + self.frames, stop + self.frames, self._there(gaze))
+        keys = self.scene.radiance(start + self.frames, stop + self.frames, self._gaze_of_scene(gaze))
         return Keyframes.known(keys.frame - self.frames, keys.radiance)
 
     def truth(self, frame: float, gaze: Gaze | None = None) -> Truth:
         """The scene's truth; its camera pose has the offset in it."""
-        return self.scene.truth(frame + self.frames, self._there(gaze))
+        return self.scene.truth(frame + self.frames, self._gaze_of_scene(gaze))
 
     def places(self, frame: float, gaze: Gaze | None = None) -> dict[str, tuple[float, float]]:
         """The scene's places."""
-        return self.scene.places(frame + self.frames, self._there(gaze))
+        return self.scene.places(frame + self.frames, self._gaze_of_scene(gaze))
 
-    def _there(self, gaze: Gaze | None) -> Gaze | None:
+    def _gaze_of_scene(self, gaze: Gaze | None) -> Gaze | None:
         if gaze is None and self.offset == self.drift == (0.0, 0.0):
             return None
         gaze = gaze or Gaze.fixed(0.0, 0.0)

@@ -1,9 +1,9 @@
 """Layers: a body rendered alone at a key time, then warped to any time near it and laid over the picture.
 
 A key is a sprite: premultiplied light, coverage and depth at `DENSITY` texels a pixel.  Of each body the two keys
-around an instant are carried to it by the true motion of the points they show, and blended by time: what either
-misplaces grows with the distance in time and has opposite sign in the two, so to first order it cancels, and
-where a key is reached only that key is seen, so nothing pops.
+around an instant are carried to it by the true motion of the points they show, and blended by time.  The error of
+either grows with the distance in time and has opposite sign in the two, so to first order it cancels.  At the time of a
+key that key alone is seen, so nothing pops.
 
 The motion of the points is summed up by a polynomial of second degree from picture to sprite,
 
@@ -14,14 +14,15 @@ on in `STEPS`: the depth that the key has at s tells how far off, z, the pixel x
 
     s' = K (R z K^-1 x + t),   K: lenses, (R, t): from the camera now to the camera at the key
 
-Of what the polynomial had misplaced each step leaves the slope of the surface times the turn of the line of sight;
-none may lead further than the polynomial is off where it is worst.
+Each step reduces the error of the polynomial to its product with the slope of the surface and the turn of the line of
+sight; none may lead further than the polynomial is off where it is worst.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
 import cv2
 import numpy as np
@@ -30,7 +31,7 @@ from numpy.typing import NDArray
 from scenes.camera import intrinsic
 from scenes.renderers.protocol import Lighting, PictureWindow, Pinhole, Renderer, Sprite, Surface
 from spikecam_env.compiled import njit
-from spikecam_env.types import Floats, Pictures
+from spikecam_env.types import Floats, Masks, Pictures
 
 DENSITY = 3
 """Texels a pixel, one ray each.  On the scene `tumble` 0.9 % rms off 16 x 16 rays a pixel where things move."""
@@ -52,21 +53,20 @@ RIDGE = 1e-4
 
 @dataclass(frozen=True, eq=False)
 class BodyKey:
-    """A body seen alone at one instant.
-
-    tints    (h, w) uint32: light x coverage in the lower 16 bits, full at `brightest`, and coverage in the upper, full
-             at 1.  Four are read for a pixel, and to fetch them is what takes the time.
-    depth    (h, w) float32; beside the body, that of what is nearest to there
-    points   (J, 3) of the body that it shows, in the body's coordinates;  texels  (J, 2) where, x then y
-    lens     (3, 3) directions (right, down, 1) to texels
-    """
+    """A body seen alone at one instant."""
 
     tints: NDArray[np.uint32]
+    """(h, w) uint32: light x coverage in the lower 16 bits, full at `brightest`, and coverage in the upper, full at 1.
+    Four are fetched for a pixel, which takes most of the time."""
     brightest: float
     depth: Pictures
+    """(h, w) float32; beside the body, that of its nearest texel."""
     points: Floats
+    """(J, 3) of the body that it shows, in the body's coordinates."""
     texels: Floats
+    """(J, 2) where these are, x then y."""
     lens: Floats
+    """(3, 3) directions (right, down, 1) to texels."""
 
     @cached_property
     def to_directions(self) -> Floats:
@@ -128,7 +128,7 @@ def _tints(light: Pictures, brightest: np.float32, cover: Pictures) -> NDArray[n
 
 
 def _filled(sprite: Sprite) -> Pictures:
-    """Depth, and beside the body that of the texel nearest to there; 0 where nothing is seen at all."""
+    """Depth, and beside the body that of the texel nearest to there; 0 where no texel is covered."""
     nothing = np.logical_not((sprite.coverage > 0) & np.isfinite(sprite.depth)).astype(np.uint8)
     if nothing.all():
         return np.zeros_like(sprite.depth)
@@ -156,8 +156,8 @@ def _dense(xy: tuple[float, float]) -> tuple[float, float]:
 
 
 def _sampled(coverage: Pictures) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
-    """(rows, columns) of texels that are covered: a grid of about SAMPLES a side, and the ends of its rows and columns,
-    as it is at the outline that a polynomial goes wrong first."""
+    """(rows, columns) of covered texels: a grid of about SAMPLES a side, and the ends of its rows and columns, since a
+    polynomial fails at the outline first."""
     solid = coverage >= min(0.99, max(float(coverage.max(initial=0)), 1e-6))
     rows, columns = (_spread(np.asarray(solid.any(axis))) for axis in (1, 0))
     if not len(rows):
@@ -173,7 +173,7 @@ def _sampled(coverage: Pictures) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
     )
 
 
-def _spread(present: NDArray[np.bool_]) -> NDArray[np.intp]:
+def _spread(present: Masks) -> NDArray[np.intp]:
     """About SAMPLES of the places that are present, evenly from the first to the last."""
     places = np.flatnonzero(present)
     return (
@@ -192,17 +192,19 @@ def project(view: Floats, points: Floats, focal: float, centre: tuple[float, flo
 def fit(key_pixels: Floats, pixels: Floats) -> tuple[Floats, Floats]:
     """The polynomials that carry pixels (n, J, 2) back to texels (J, 2) of the key.
 
-    Returns the frames of reference (n, 3): middle x, y and 1 / spread; and the coefficients (n, 2, 6).
-    What points do not determine stays as it is without turn: texels = DENSITY * pixels + constant.
+    Coefficients that points do not determine are those without turn: texels = DENSITY * pixels + constant.
+
+    Returns:
+        The frames of reference (n, 3): middle x, y and 1 / spread; and the coefficients (n, 2, 6).
     """
-    reference, found = np.empty((len(pixels), 3)), np.empty((len(pixels), 2, 6))
-    _fit(np.ascontiguousarray(key_pixels), np.ascontiguousarray(pixels), reference, found)
-    return reference, found
+    reference, coefficients = np.empty((len(pixels), 3)), np.empty((len(pixels), 2, 6))
+    _fit(np.ascontiguousarray(key_pixels), np.ascontiguousarray(pixels), reference, coefficients)
+    return reference, coefficients
 
 
 @njit(nogil=True, cache=True, error_model="numpy")
-def _fit(key_pixels: Floats, pixels: Floats, reference: Floats, found: Floats) -> None:
-    """See `fit`; instant by instant, so that none depends on what else is asked for."""
+def _fit(key_pixels: Floats, pixels: Floats, reference: Floats, coefficients: Floats) -> None:
+    """See `fit`; instant by instant, so that none depends on the others."""
     normal, right, basis = np.empty((6, 6)), np.empty((6, 2)), np.empty(6)
     for n in range(len(pixels)):
         points, count = pixels[n], len(key_pixels)
@@ -230,13 +232,13 @@ def _fit(key_pixels: Floats, pixels: Floats, reference: Floats, found: Floats) -
         reference[n, 0], reference[n, 1], reference[n, 2] = x, y, 1 / spread
         for axis in range(2):
             for row in range(6):
-                found[n, axis, row] = right[row, axis]
-            found[n, axis, 1 + axis] += DENSITY * spread
+                coefficients[n, axis, row] = right[row, axis]
+            coefficients[n, axis, 1 + axis] += DENSITY * spread
 
 
 @njit(inline="always")
 def _basis(u: float, v: float, basis: Floats) -> None:
-    """What the polynomial is a sum of, (6,), at (u, v)."""
+    """The terms of the polynomial, (6,), at (u, v)."""
     basis[0], basis[1], basis[2], basis[3], basis[4], basis[5] = 1.0, u, v, u * u, u * v, v * v
 
 
@@ -262,7 +264,7 @@ def _solve(normal: Floats, right: Floats) -> None:
 
 
 @njit(nogil=True, cache=True, error_model="numpy")
-def _astray(key_pixels: Floats, pixels: Floats, reference: Floats, found: Floats, furthest: Floats) -> None:
+def _astray(key_pixels: Floats, pixels: Floats, reference: Floats, coefficients: Floats, furthest: Floats) -> None:
     """furthest (n,): how far the polynomials put pixels (n, J, 2) from texels (J, 2) of the key, in x or y, at most."""
     basis = np.empty(6)
     for n in range(len(pixels)):
@@ -276,21 +278,31 @@ def _astray(key_pixels: Floats, pixels: Floats, reference: Floats, found: Floats
             for axis in range(2):
                 place = 0.0
                 for row in range(6):
-                    place += found[n, axis, row] * basis[row]
+                    place += coefficients[n, axis, row] * basis[row]
                 furthest[n] = max(furthest[n], abs(place - key_pixels[j, axis]))
 
 
 @dataclass(frozen=True, eq=False)
 class Carried:
-    """A key carried to n instants: frames of reference (n, 3) and coefficients (n, 2, 6) as `fit` gives them, and the
-    motion itself: `rigid` (n, 17), four numbers that give the depth now of a texel (x, y) of depth z, as
-    z (a x + b y + c) + d, and a matrix (3, 4) from a pixel (x, y) of depth z, as (z x, z y, z, 1), to its texel, and
-    how far the polynomial is off at most, of the points that the key shows [texels]."""
+    """A key carried to n instants."""
 
     key: BodyKey
     reference: Pictures
+    """(n, 3) as `fit` gives it."""
     coefficients: Pictures
+    """(n, 2, 6) as `fit` gives them."""
     rigid: Pictures
+    """(n, 17), the motion itself.
+
+    - 0 to 3: a, b, c, d; a texel (x, y) of depth z in the key has the depth z (a x + b y + c) + d now.
+    - 4 to 15: a matrix (3, 4) from a pixel (x, y) of depth z, as (z x, z y, z, 1), to its texel.
+    - 16: the largest error of the polynomial at the points that the key shows [texels].
+    """
+
+    def arrays(self) -> tuple[Any, ...]:
+        """Tints, depth, brightest light, and the numbers of the instants, for compiled code."""
+        key = self.key
+        return key.tints, key.depth, np.float32(key.brightest), self.reference, self.coefficients, self.rigid
 
     def at(self, instants: slice) -> Carried:
         """At some of the instants."""
@@ -336,142 +348,205 @@ def lay(
 ) -> None:
     """Lay a body over pictures (n, H, W), in place: out = light + (1 - coverage) x picture.
 
-    boxes    (n, 4) where it may be seen: top, left, bottom, right
-    share    (n,) of the later key, 0..1
-    solid    whether depth carries the keys too
-    depths   (n, H, W), of what has been laid so far; used if `tested` (hide where deeper) or `marked` (write)
+    Args:
+        depths: (n, H, W), of the layers so far; used if `tested` (hide where deeper) or `marked` (write).
+        boxes: (n, 4) where it may be seen: top, left, bottom, right.
+        before: the earlier of two keys.
+        after: the later one.
+        share: (n,) of the later key, 0..1.
+        solid: whether depth carries the keys too.
     """
-    _lay(
-        pictures,
-        depths,
-        boxes,
-        before.key.tints,
-        before.key.depth,
-        np.float32(before.key.brightest),
-        before.reference,
-        before.coefficients,
-        before.rigid,
-        after.key.tints,
-        after.key.depth,
-        np.float32(after.key.brightest),
-        after.reference,
-        after.coefficients,
-        after.rigid,
-        share,
-        solid,
-        tested,
-        marked,
-    )
+    _lay(pictures, depths, boxes, before.arrays(), after.arrays(), share, solid, tested, marked)
 
 
 @njit(nogil=True, cache=True, error_model="numpy", fastmath=True)
 def _add(
-    layer: Pictures,
-    box: NDArray[np.int64],
-    weight: np.float32,
-    tints: NDArray[np.uint32],
-    brightest: np.float32,
-    depth: Pictures,
-    reference: Pictures,
-    coefficients: Pictures,
-    rigid: Pictures,
-    solid: bool,
-    deep: bool,
+    layer: Pictures, box: NDArray[np.int64], weight: np.float32, carried: Any, n: int, solid: bool, deep: bool
 ) -> None:
     """Add weight x key, read bilinear, to a layer (3, h, w) of light, coverage and distance, the box of the picture.
 
     Each row goes through short loops over arrays of its own, places, texels, light: all but those that fetch are
     vectors then.  Pixels at either end that read nothing of the key are left out.
     """
+    tints, depth, brightest, references, coefficients, motions = carried
     top, left, bottom, right = box
-    height, width = tints.shape
-    cells, depths = tints.reshape(-1), depth.reshape(-1)
-    most = right - left
-    s, t = np.empty(most, np.float32), np.empty(most, np.float32)
-    first_s, first_t = np.empty(most, np.float32), np.empty(most, np.float32)
-    p, q = np.empty(most, np.float32), np.empty(most, np.float32)
-    at, z = np.empty(most, np.uint32), np.empty(most, np.float32)
-    here, next_here = np.empty(most, np.uint32), np.empty(most, np.uint32)
-    below, next_below = np.empty(most, np.uint32), np.empty(most, np.uint32)
-    e, f, g, h = (
+    most, cells, depths = right - left, tints.reshape(-1), depth.reshape(-1)
+    x, y = np.empty(most, np.float32), np.empty(most, np.float32)
+    first_x, first_y = np.empty(most, np.float32), np.empty(most, np.float32)
+    right_share, lower_share = np.empty(most, np.float32), np.empty(most, np.float32)
+    cell, z = np.empty(most, np.uint32), np.empty(most, np.float32)
+    corners = np.empty(most, np.uint32), np.empty(most, np.uint32), np.empty(most, np.uint32), np.empty(most, np.uint32)
+    corner_depths = (
         np.empty(most, np.float32),
         np.empty(most, np.float32),
         np.empty(most, np.float32),
         np.empty(most, np.float32),
     )
-    zero, half, one, nearest = np.float32(0), np.float32(0.5), np.float32(1), np.float32(1e-9)
-    last_s, last_t = np.float32(width - 1.001), np.float32(height - 1.001)
-    columns, right_of, bits, upper = np.int32(width), np.uint32(1), np.uint32(0xFFFF), np.uint32(16)
-    under = np.uint32(width)
-    of_light, of_cover = weight * brightest / np.float32(65535), weight / np.float32(65535)
-    c, k, x = coefficients, reference[2], np.float32(left)
-    bend, sag, u0 = c[0, 3] * k * k, c[1, 3] * k * k, x - reference[0]
-    of_s, of_t, rest, nearer = rigid[0], rigid[1], rigid[2], rigid[3]
-    step_s, step_t, step_w = rigid[4], rigid[8], rigid[12]
-    shift_s, shift_t, shift_w, astray = rigid[7], rigid[11], rigid[15], rigid[16]
+    last = np.float32(tints.shape[1] - 1.001), np.float32(tints.shape[0] - 1.001)
+    width, below = np.int32(tints.shape[1]), np.uint32(tints.shape[1])
+    steps = weight * brightest / np.float32(65535), weight / np.float32(65535)
+    law, scale, column = coefficients[n], references[n, 2], np.float32(left)
+    bend, u_first = (law[0, 3] * scale * scale, law[1, 3] * scale * scale), column - references[n, 0]
+    motion = motions[n]
+    now = motion[0], motion[1], motion[2], motion[3]
+    step, shift = (motion[4], motion[8], motion[12]), (motion[7], motion[11], motion[15], motion[16])
     for row in range(bottom - top):
-        y = np.float32(top + row)
-        v = (y - reference[1]) * k
-        a, b = c[0, 0] + v * (c[0, 2] + v * c[0, 5]), (c[0, 1] + v * c[0, 4]) * k
-        d, r = c[1, 0] + v * (c[1, 2] + v * c[1, 5]), (c[1, 1] + v * c[1, 4]) * k
-        for i in range(most):
-            u = u0 + np.float32(i)
-            s[i] = min(max(a + u * (b + u * bend), zero), last_s)
-            t[i] = min(max(d + u * (r + u * sag), zero), last_t)
+        line = np.float32(top + row)
+        v = (line - references[n, 1]) * scale
+        level = law[0, 0] + v * (law[0, 2] + v * law[0, 5]), law[1, 0] + v * (law[1, 2] + v * law[1, 5])
+        slope = (law[0, 1] + v * law[0, 4]) * scale, (law[1, 1] + v * law[1, 4]) * scale
+        _place_by_polynomial(level, slope, bend, u_first, last, x, y)
         if solid:
-            row_s = step_s * x + rigid[5] * y + rigid[6]
-            row_t = step_t * x + rigid[9] * y + rigid[10]
-            row_w = step_w * x + rigid[13] * y + rigid[14]
+            of_row = (
+                step[0] * column + motion[5] * line + motion[6],
+                step[1] * column + motion[9] * line + motion[10],
+                step[2] * column + motion[13] * line + motion[14],
+            )
             for i in range(most):
-                first_s[i], first_t[i] = s[i], t[i]
+                first_x[i], first_y[i] = x[i], y[i]
             for _ in range(STEPS):
-                for i in range(most):
-                    at[i] = np.int32(t[i] + half) * columns + np.int32(s[i] + half)
-                for i in range(most):
-                    z[i] = depths[at[i]]
-                for i in range(most):
-                    away, along = z[i] * (of_s * s[i] + of_t * t[i] + rest) + nearer, np.float32(i)
-                    w = one / max(away * (row_w + step_w * along) + shift_w, nearest)
-                    by_depth_s = (away * (row_s + step_s * along) + shift_s) * w
-                    by_depth_t = (away * (row_t + step_t * along) + shift_t) * w
-                    s[i] = min(max(by_depth_s, first_s[i] - astray, zero), first_s[i] + astray, last_s)
-                    t[i] = min(max(by_depth_t, first_t[i] - astray, zero), first_t[i] + astray, last_t)
-        for i in range(most):
-            j = np.int32(t[i])
-            m = np.int32(s[i])
-            at[i] = j * columns + m
-            p[i], q[i] = s[i] - np.float32(m), t[i] - np.float32(j)
+                _fetch_depth(depths, width, x, y, cell, z)
+                _place_by_depth(now, of_row, step, shift, last, z, first_x, first_y, x, y)
+        _split_places(width, x, y, cell, right_share, lower_share)
         start, stop = 0, most
-        while start < stop and _empty(cells, at[start], under):
+        while start < stop and _empty(cells, cell[start], below):
             start += 1
-        while start < stop and _empty(cells, at[stop - 1], under):
+        while start < stop and _empty(cells, cell[stop - 1], below):
             stop -= 1
-        count = stop - start
-        ats, ps, qs = at[start:stop], p[start:stop], q[start:stop]
-        for i in range(count):
-            m = ats[i]
-            here[i], next_here[i] = cells[m], cells[m + right_of]
-            below[i], next_below[i] = cells[m + under], cells[m + under + right_of]
-        light, cover = layer[0, row, start:stop], layer[1, row, start:stop]
-        for i in range(count):
-            high, low = np.float32(np.int32(here[i] & bits)), np.float32(np.int32(below[i] & bits))
-            high += ps[i] * (np.float32(np.int32(next_here[i] & bits)) - high)
-            low += ps[i] * (np.float32(np.int32(next_below[i] & bits)) - low)
-            light[i] += of_light * (high + qs[i] * (low - high))
-            high, low = np.float32(np.int32(here[i] >> upper)), np.float32(np.int32(below[i] >> upper))
-            high += ps[i] * (np.float32(np.int32(next_here[i] >> upper)) - high)
-            low += ps[i] * (np.float32(np.int32(next_below[i] >> upper)) - low)
-            cover[i] += of_cover * (high + qs[i] * (low - high))
+        seen, shares = cell[start:stop], (right_share[start:stop], lower_share[start:stop])
+        _add_tints(cells, below, seen, shares, steps, corners, layer[0, row, start:stop], layer[1, row, start:stop])
         if deep:
-            for i in range(count):
-                m = ats[i]
-                e[i], f[i] = depths[m], depths[m + right_of]
-                g[i], h[i] = depths[m + under], depths[m + under + right_of]
-            ss, ts, away_row = s[start:stop], t[start:stop], layer[2, row, start:stop]
-            for i in range(count):
-                high, low = e[i] + ps[i] * (f[i] - e[i]), g[i] + ps[i] * (h[i] - g[i])
-                seen = high + qs[i] * (low - high)
-                away_row[i] += weight * (seen * (of_s * ss[i] + of_t * ts[i] + rest) + nearer)
+            places, away = (x[start:stop], y[start:stop]), layer[2, row, start:stop]
+            _add_distance(depths, below, seen, shares, weight, now, places, corner_depths, away)
+
+
+@njit(inline="always")
+def _place_by_polynomial(level: Any, slope: Any, bend: Any, u_first: Any, last: Any, x: Pictures, y: Pictures) -> None:
+    """Texels (x, y) of the key at the pixels of a row: level + slope u + bend u^2, inside the key.
+
+    All but the arrays and u_first, of the first pixel, are of x and y.
+    """
+    zero, level_x, level_y, slope_x, slope_y = np.float32(0), level[0], level[1], slope[0], slope[1]
+    bend_x, bend_y, last_x, last_y = bend[0], bend[1], last[0], last[1]
+    for i in range(len(x)):
+        u = u_first + np.float32(i)
+        x[i] = min(max(level_x + u * (slope_x + u * bend_x), zero), last_x)
+        y[i] = min(max(level_y + u * (slope_y + u * bend_y), zero), last_y)
+
+
+@njit(inline="always")
+def _fetch_depth(
+    depths: Pictures, width: np.int32, x: Pictures, y: Pictures, cell: NDArray[np.uint32], z: Pictures
+) -> None:
+    """Depth z that the key has at the texels next to (x, y)."""
+    half = np.float32(0.5)
+    for i in range(len(x)):
+        cell[i] = np.int32(y[i] + half) * width + np.int32(x[i] + half)
+    for i in range(len(x)):
+        z[i] = depths[cell[i]]
+
+
+@njit(inline="always")
+def _place_by_depth(
+    now: Any,
+    of_row: Any,
+    step: Any,
+    shift: Any,
+    last: Any,
+    z: Pictures,
+    first_x: Pictures,
+    first_y: Pictures,
+    x: Pictures,
+    y: Pictures,
+) -> None:
+    """Move texels (x, y) to their places by depth z, at most as far as the polynomial is off (`Carried.rigid`).
+
+    Args:
+        now: four numbers that give the depth now.
+        of_row: the matrix times the row's first pixel.
+        step: its change from pixel to pixel.
+        shift: its last column, and the largest error of the polynomial.
+        last: last texel in x and y.
+    """
+    zero, one, nearest, last_x, last_y = np.float32(0), np.float32(1), np.float32(1e-9), last[0], last[1]
+    now_x, now_y, now_rest, nearer = now[0], now[1], now[2], now[3]
+    row_x, row_y, row_w, step_x, step_y, step_w = of_row[0], of_row[1], of_row[2], step[0], step[1], step[2]
+    shift_x, shift_y, shift_w, astray = shift[0], shift[1], shift[2], shift[3]
+    for i in range(len(x)):
+        away, along = z[i] * (now_x * x[i] + now_y * y[i] + now_rest) + nearer, np.float32(i)
+        w = one / max(away * (row_w + step_w * along) + shift_w, nearest)
+        by_depth_x = (away * (row_x + step_x * along) + shift_x) * w
+        by_depth_y = (away * (row_y + step_y * along) + shift_y) * w
+        x[i] = min(max(by_depth_x, first_x[i] - astray, zero), first_x[i] + astray, last_x)
+        y[i] = min(max(by_depth_y, first_y[i] - astray, zero), first_y[i] + astray, last_y)
+
+
+@njit(inline="always")
+def _split_places(
+    width: np.int32, x: Pictures, y: Pictures, cell: NDArray[np.uint32], right_share: Pictures, lower_share: Pictures
+) -> None:
+    """Texels (x, y) as the cell to their upper left, and the shares of the cells to the right of it and below."""
+    for i in range(len(x)):
+        row, column = np.int32(y[i]), np.int32(x[i])
+        cell[i] = row * width + column
+        right_share[i], lower_share[i] = x[i] - np.float32(column), y[i] - np.float32(row)
+
+
+@njit(inline="always")
+def _add_tints(
+    cells: NDArray[np.uint32],
+    below: np.uint32,
+    seen: NDArray[np.uint32],
+    shares: tuple[Pictures, Pictures],
+    steps: tuple[np.float32, np.float32],
+    corners: Any,
+    light: Pictures,
+    cover: Pictures,
+) -> None:
+    """Add light and coverage of the cells seen, each in steps of the tints."""
+    (right_share, lower_share), (light_step, cover_step) = shares, steps
+    to_right, bits, half = np.uint32(1), np.uint32(0xFFFF), np.uint32(16)
+    here, right, lower, lower_right = corners
+    for i in range(len(seen)):
+        cell = seen[i]
+        here[i], right[i] = cells[cell], cells[cell + to_right]
+        lower[i], lower_right[i] = cells[cell + below], cells[cell + below + to_right]
+    for i in range(len(seen)):
+        high, low = np.float32(np.int32(here[i] & bits)), np.float32(np.int32(lower[i] & bits))
+        high += right_share[i] * (np.float32(np.int32(right[i] & bits)) - high)
+        low += right_share[i] * (np.float32(np.int32(lower_right[i] & bits)) - low)
+        light[i] += light_step * (high + lower_share[i] * (low - high))
+        high, low = np.float32(np.int32(here[i] >> half)), np.float32(np.int32(lower[i] >> half))
+        high += right_share[i] * (np.float32(np.int32(right[i] >> half)) - high)
+        low += right_share[i] * (np.float32(np.int32(lower_right[i] >> half)) - low)
+        cover[i] += cover_step * (high + lower_share[i] * (low - high))
+
+
+@njit(inline="always")
+def _add_distance(
+    depths: Pictures,
+    below: np.uint32,
+    seen: NDArray[np.uint32],
+    shares: tuple[Pictures, Pictures],
+    weight: np.float32,
+    now: Any,
+    places: tuple[Pictures, Pictures],
+    corners: Any,
+    away: Pictures,
+) -> None:
+    """Add weight x the distance now of the cells seen."""
+    (right_share, lower_share), (x, y), to_right = shares, places, np.uint32(1)
+    here, right, lower, lower_right = corners
+    now_x, now_y, now_rest, nearer = now
+    for i in range(len(seen)):
+        cell = seen[i]
+        here[i], right[i] = depths[cell], depths[cell + to_right]
+        lower[i], lower_right[i] = depths[cell + below], depths[cell + below + to_right]
+    for i in range(len(seen)):
+        high = here[i] + right_share[i] * (right[i] - here[i])
+        low = lower[i] + right_share[i] * (lower_right[i] - lower[i])
+        depth = high + lower_share[i] * (low - high)
+        away[i] += weight * (depth * (now_x * x[i] + now_y * y[i] + now_rest) + nearer)
 
 
 @njit(nogil=True, cache=True, error_model="numpy", inline="always")
@@ -485,26 +560,17 @@ def _lay(
     pictures: Pictures,
     depths: Pictures,
     boxes: NDArray[np.int64],
-    tints0: NDArray[np.uint32],
-    depth0: Pictures,
-    brightest0: np.float32,
-    reference0: Pictures,
-    coefficients0: Pictures,
-    rigid0: Pictures,
-    tints1: NDArray[np.uint32],
-    depth1: Pictures,
-    brightest1: np.float32,
-    reference1: Pictures,
-    coefficients1: Pictures,
-    rigid1: Pictures,
+    before: Any,
+    after: Any,
     share: Pictures,
     solid: bool,
     tested: bool,
     marked: bool,
 ) -> None:
+    """See `lay`; keys as `Carried.arrays` gives them."""
     zero, half, one = np.float32(0), np.float32(0.5), np.float32(1)
     deep = tested or marked
-    resting = _resting(boxes, reference0, coefficients0, share)
+    resting = _resting(boxes, before[3], before[4], share)
     rows, columns = max((boxes[:, 2] - boxes[:, 0]).max(), 0), max((boxes[:, 3] - boxes[:, 1]).max(), 0)
     layer = np.empty((3, rows, columns), np.float32)
     for n in range(len(pictures)):
@@ -513,35 +579,10 @@ def _lay(
             continue
         if not resting[n]:
             layer[:, : bottom - top, : right - left] = zero
-            w = share[n]
-            if w < one:
-                _add(
-                    layer,
-                    boxes[n],
-                    one - w,
-                    tints0,
-                    brightest0,
-                    depth0,
-                    reference0[n],
-                    coefficients0[n],
-                    rigid0[n],
-                    solid,
-                    deep,
-                )
-            if w > zero:
-                _add(
-                    layer,
-                    boxes[n],
-                    w,
-                    tints1,
-                    brightest1,
-                    depth1,
-                    reference1[n],
-                    coefficients1[n],
-                    rigid1[n],
-                    solid,
-                    deep,
-                )
+            if share[n] < one:
+                _add(layer, boxes[n], one - share[n], before, n, solid, deep)
+            if share[n] > zero:
+                _add(layer, boxes[n], share[n], after, n, solid, deep)
         for row in range(bottom - top):
             light, cover, away = layer[0, row], layer[1, row], layer[2, row]
             picture = pictures[n, top + row, left:right]
@@ -559,9 +600,7 @@ def _lay(
 
 
 @njit(nogil=True, cache=True)
-def _resting(
-    boxes: NDArray[np.int64], reference: Pictures, coefficients: Pictures, share: Pictures
-) -> NDArray[np.bool_]:
+def _resting(boxes: NDArray[np.int64], reference: Pictures, coefficients: Pictures, share: Pictures) -> Masks:
     """Whether a body is seen just as at the instant before: its rows need not be read again."""
     resting = np.zeros(len(boxes), np.bool_)
     for n in range(1, len(boxes)):

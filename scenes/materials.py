@@ -1,4 +1,4 @@
-"""What a mesh says of its own reflection, as grey albedo: colours of vertices or faces, materials.
+"""A mesh's own reflection, as grey albedo: colours of vertices or faces, materials.
 
 Linear or not: pictures and colours of vertices and faces are sRGB, factors (Kd of MTL) are linear.  glTF has rules of
 its own (`scenes.gltf`).
@@ -106,7 +106,7 @@ def _coloured(
 
 
 def _check_ply(mesh: trimesh.Trimesh, kind: str) -> None:
-    """Errors: InputError for colours of a PLY that trimesh cuts to 8 bits: those of 16, and floats above 1."""
+    """Refuse colours of a PLY that trimesh cuts to 8 bits: those of 16, and floats above 1."""
     data: Any = mesh.metadata.get("_ply_raw", {}).get(kind, {}).get("data", {})
     for name in {"red", "green", "blue"} & set(data if isinstance(data, dict) else data.dtype.names):
         values = np.asarray(data[name])

@@ -42,7 +42,7 @@ def from_file(
     """A mesh file (obj, stl, ply, glb, ...), with the texture given, or its own reflection.
 
     Its own: colours of vertices and faces, factors and pictures of materials, as grey; 0.7 where it says nothing.
-    Several meshes in one file become one surface.  One warning names what the file has and the surface does not show.
+    Several meshes in one file become one surface.  One warning names the parts of the file that it does not show.
 
     Args:
         path: a glTF file, or of a format that trimesh reads.
@@ -65,7 +65,7 @@ def from_file(
     source = Path(path)
     if not _is_file(source):
         raise InputError(f"no mesh file {path}; give the path of an obj, stl, ply or glb file")
-    beside, unread = Beside(str(source)), dict[str, None]()
+    beside, unread = NeighbourFiles(str(source)), dict[str, None]()
     try:
         pieces = _sized(_pieces(source, beside, unread, texture is None), size)
         surface = _one_surface([_merged(piece) for piece in pieces], texture, unread)
@@ -83,7 +83,7 @@ def from_mesh(
 ) -> Surface:
     """A trimesh mesh; without texture coordinates of its own a texture is wrapped around its vertical axis.
 
-    Normals that were given to the mesh are kept.  A warning names what its material has and the surface does not show.
+    Normals that were given to the mesh are kept.  A warning names parts of its material that the surface does not show.
 
     Args:
         mesh: with faces; it is copied.
@@ -91,8 +91,8 @@ def from_mesh(
         size: of its longest side, the middle at the origin; default: as it is.
 
     Raises:
-        InputError: the mesh has no triangles or no area, vertices that are not finite, faces of vertices that it does
-            not have, a longest side out of 0.001 to 1e6 where no size is given, or albedo out of 0 to 1.
+        InputError: the mesh has no triangles or no area, vertices that are not finite, or faces of vertices that it
+            does not have.  Its longest side is out of 0.001 to 1e6 where no size is given, or albedo is out of 0 to 1.
 
     Example:
         >>> import trimesh
@@ -110,13 +110,17 @@ def picture(path: str | PathLike[str]) -> Texture:
     """A picture file as linear grey, (h, w) float32, upright as its EXIF says.
 
     Whole numbers are in [0, 1], taken as sRGB unless the file states another transfer; floats are linear light as they
-    are.  Errors: InputError where no picture can be read, and for transparent pixels (`scenes.pictures`).
+    are.
 
-    >>> from PIL import Image
-    >>> Image.fromarray(np.full((4, 6), 255, np.uint8)).save("white.png")
-    >>> light = picture("white.png")
-    >>> light.shape, float(light.max())
-    ((4, 6), 1.0)
+    Raises:
+        InputError: no picture can be read, or pixels are transparent.
+
+    Example:
+        >>> from PIL import Image
+        >>> Image.fromarray(np.full((4, 6), 255, np.uint8)).save("white.png")
+        >>> light = picture("white.png")
+        >>> light.shape, float(light.max())
+        ((4, 6), 1.0)
     """
     if not _is_file(Path(path)):
         raise InputError(f"no picture can be read from {path}; give the path of a png, jpg or tif file")
@@ -124,11 +128,12 @@ def picture(path: str | PathLike[str]) -> Texture:
     return grey(light_of(stored.values, stored.transfer or "srgb", str(path)), primaries=stored.primaries)
 
 
-class Beside(trimesh.resolvers.FilePathResolver):
+class NeighbourFiles(trimesh.resolvers.FilePathResolver):
     """Files that a mesh file names, in its folder.
 
-    faults     says of each what is wrong with it
-    materials  names of those that its material libraries (MTL) have
+    Args:
+        faults: the fault of each file.
+        materials: names of those that its material libraries (MTL) have.
     """
 
     def __init__(self, source: str) -> None:
@@ -137,7 +142,7 @@ class Beside(trimesh.resolvers.FilePathResolver):
         self.materials: set[str] = set()
 
     def get(self, name: str) -> Any:
-        """The bytes of a file; raises what trimesh expects where there are none."""
+        """The bytes of a file; a missing one raises the error that trimesh expects."""
         try:
             if not Path(self.parent, name.strip()).resolve().is_relative_to(Path(self.parent).resolve()):
                 raise OSError("lies outside of its folder")
@@ -159,10 +164,11 @@ class Beside(trimesh.resolvers.FilePathResolver):
         return data
 
 
-def _pieces(source: Path, beside: Beside, unread: dict[str, None], own: bool) -> list[MeshPart]:
+def _pieces(source: Path, beside: NeighbourFiles, unread: dict[str, None], own: bool) -> list[MeshPart]:
     """The meshes of a file; their albedos where it is a glTF file, which has them in its own way.
 
-    Raises InputError where it cannot be read.
+    Raises:
+        InputError: it cannot be read.
     """
     kind = source.suffix[1:].lower()
     try:
@@ -180,8 +186,8 @@ def _pieces(source: Path, beside: Beside, unread: dict[str, None], own: bool) ->
         raise InputError(f"it cannot be read as a mesh ({why}); give an obj, stl, ply or glb file") from error
 
 
-def _by_trimesh(kind: str, data: bytes, beside: Beside, unread: dict[str, None]) -> list[trimesh.Trimesh]:
-    """The meshes of a file that is no glTF; adds to `unread` what they do not show."""
+def _by_trimesh(kind: str, data: bytes, beside: NeighbourFiles, unread: dict[str, None]) -> list[trimesh.Trimesh]:
+    """The meshes of a file that is no glTF; adds the parts that they do not show to `unread`."""
     if kind in ARCHIVES:
         raise InputError("it is an archive; unpack it, and give the mesh file in it")
     if kind == "obj":
@@ -208,7 +214,7 @@ def _placed(scene: trimesh.Scene) -> Iterator[trimesh.Trimesh]:
 def _one_surface(
     pieces: Sequence[MeshPart], texture: str | PathLike[str] | Texture | None, unread: dict[str, None]
 ) -> Surface:
-    """Meshes in one space as one rigid surface; adds to `unread` what it does not show."""
+    """Meshes in one space as one rigid surface; adds the parts that it does not show to `unread`."""
     emissions = {piece.emission for piece in pieces}
     if len(emissions) > 1:
         unread["emission of some parts"] = None
@@ -262,7 +268,7 @@ def _textured(mesh: trimesh.Trimesh, albedo: Albedo) -> Surface:
 
 
 def _sized(pieces: Sequence[MeshPart], size: float | None) -> list[MeshPart]:
-    """Copies, checked; their longest side as asked, their middle at the origin."""
+    """Checked copies with the longest side given, the middle at the origin."""
     if not any(len(getattr(piece.mesh, "faces", ())) for piece in pieces):
         raise InputError("the mesh has no triangles; a cloud of points has no surface to render")
     if size is not None and not 0 < size < np.inf:

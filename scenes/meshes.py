@@ -48,10 +48,12 @@ __all__ = [
 def sheet(points: Callable[[Points, Points], Sequence[Points]], shape: tuple[int, int], albedo: Albedo = 0.8) -> Part:
     """A smooth grid: points(u, v) -> x, y, z, for u, v in [0, 1], u to the right and v up as seen from outside.
 
-    shape   cells along v and u
+    Args:
+        shape: cells along v and u.
 
-    >>> sheet(lambda u, v: (u, v, 0 * u), (4, 2)).vertices.shape
-    (15, 3)
+    Example:
+        >>> sheet(lambda u, v: (u, v, 0 * u), (4, 2)).vertices.shape
+        (15, 3)
     """
     rows, columns = shape
 
@@ -81,11 +83,14 @@ def lathe(
 ) -> Part:
     """A profile of (radius, height), from the bottom up along the outside, turned about y.
 
-    The texture goes round once, from the bottom to the top of the profile.  smooth: a curve through the points
-    (Catmull-Rom), else straight pieces with edges between.
+    The texture goes round once, from the bottom to the top of the profile.
 
-    >>> lathe([(0.0, 0.0), (0.5, 0.5), (0.0, 1.0)]).vertices.round(6).max(axis=0).tolist()
-    [0.5, 1.0, 0.5]
+    Args:
+        smooth: a curve through the points (Catmull-Rom), else straight pieces with edges between.
+
+    Example:
+        >>> lathe([(0.0, 0.0), (0.5, 0.5), (0.0, 1.0)]).vertices.round(6).max(axis=0).tolist()
+        [0.5, 1.0, 0.5]
     """
     knots = np.asarray(profile, np.float64)
     if not smooth:
@@ -103,8 +108,9 @@ def lathe(
 def sphere(radius: float = 1.0, albedo: Albedo = 0.8, sections: int = 64) -> Part:
     """u is the longitude, v the latitude.
 
-    >>> sphere(2.0).vertices.max(axis=0).round(6).tolist()
-    [2.0, 2.0, 2.0]
+    Example:
+        >>> sphere(2.0).vertices.max(axis=0).round(6).tolist()
+        [2.0, 2.0, 2.0]
     """
 
     def points(u: Points, v: Points) -> Sequence[Points]:
@@ -118,8 +124,9 @@ def sphere(radius: float = 1.0, albedo: Albedo = 0.8, sections: int = 64) -> Par
 def torus(radius: float, thickness: float, albedo: Albedo = 0.8, sections: int = 64) -> Part:
     """A ring about y; `thickness` is the radius of the tube.
 
-    >>> torus(1.0, 0.25).vertices.max(axis=0).round(2).tolist()
-    [1.25, 0.25, 1.25]
+    Example:
+        >>> torus(1.0, 0.25).vertices.max(axis=0).round(2).tolist()
+        [1.25, 0.25, 1.25]
     """
 
     def points(u: Points, v: Points) -> Sequence[Points]:
@@ -133,8 +140,9 @@ def torus(radius: float, thickness: float, albedo: Albedo = 0.8, sections: int =
 def capsule(length: float, radius: float, albedo: Albedo = 0.8, sections: int = 32, taper: float = 1.0) -> Part:
     """A rounded stick along y from 0 to `length` between the middles of its ends; taper: radius of the upper end.
 
-    >>> round(float(capsule(1.0, 0.2).vertices[:, 1].max()), 3)
-    1.2
+    Example:
+        >>> round(float(capsule(1.0, 0.2).vertices[:, 1].max()), 3)
+        1.2
     """
     bend = np.linspace(-np.pi / 2, 0, 6)
     lower = [(radius * np.cos(a), radius * np.sin(a)) for a in bend]
@@ -146,8 +154,9 @@ def capsule(length: float, radius: float, albedo: Albedo = 0.8, sections: int = 
 def disc(radius: float, albedo: Albedo = 0.8, sections: int = 96) -> Part:
     """In the plane z = 0, facing +z; the texture is the square around it.
 
-    >>> disc(0.5).normals[0].tolist()
-    [0.0, 0.0, 1.0]
+    Example:
+        >>> disc(0.5).normals[0].tolist()
+        [0.0, 0.0, 1.0]
     """
     turn = 2 * np.pi * np.arange(sections) / sections
     rim = np.stack([np.cos(turn), np.sin(turn)], -1)
@@ -161,8 +170,9 @@ def disc(radius: float, albedo: Albedo = 0.8, sections: int = 96) -> Part:
 def rectangle(width: float, height: float, albedo: Albedo = 0.8, cells: int = 1) -> Part:
     """In the plane z = 0, facing +z, the middle at the origin.
 
-    >>> rectangle(2.0, 1.0).vertices[:, :2].tolist()
-    [[-1.0, -0.5], [1.0, -0.5], [-1.0, 0.5], [1.0, 0.5]]
+    Example:
+        >>> rectangle(2.0, 1.0).vertices[:, :2].tolist()
+        [[-1.0, -0.5], [1.0, -0.5], [-1.0, 0.5], [1.0, 0.5]]
     """
     return sheet(lambda u, v: ((u - 0.5) * width, (v - 0.5) * height, 0 * u), (cells, cells), albedo)
 
@@ -170,8 +180,9 @@ def rectangle(width: float, height: float, albedo: Albedo = 0.8, cells: int = 1)
 def box(extents: tuple[float, float, float], albedo: Albedo | Sequence[Albedo] = 0.8, cells: int = 1) -> list[Part]:
     """Six rectangles: front (+z), right (+x), back, left, top (+y), bottom; an albedo for all or for each.
 
-    >>> len(box((1.0, 2.0, 3.0)))
-    6
+    Example:
+        >>> len(box((1.0, 2.0, 3.0)))
+        6
     """
     sides: list[Any] = list(albedo) if isinstance(albedo, (list, tuple)) else [albedo] * 6
     if len(sides) != 6:
@@ -191,8 +202,9 @@ def prism(outline: Sequence[tuple[float, float]], depth: float, side: Albedo = 0
 
     The faces' texture spans the outline's bounding box; the sides are one grey.
 
-    >>> len(prism([(0.0, 0.0), (1.0, 0.0), (0.0, 1.0)], depth=0.5))
-    5
+    Example:
+        >>> len(prism([(0.0, 0.0), (1.0, 0.0), (0.0, 1.0)], depth=0.5))
+        5
     """
     corners = np.asarray(outline, np.float64)
     triangles = _triangulated(corners)

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, NamedTuple
 
 import cv2
 import numpy as np
@@ -13,6 +14,7 @@ from numpy.typing import NDArray
 from spikecam_env.checked import checked_memory
 from spikecam_env.compiled import njit
 from spikecam_env.sensor.compiled_tools.intrinsics import pointer_to, take_ticket, two_at, use_widest_vectors
+from spikecam_env.types import Floats, Pictures
 
 TEXELS_PER_PIXEL = 5
 """Of the prefiltered texture.  At a key the default disk is 0.75 % rms of full scale off 16 x 16 supersampling at 5,
@@ -26,18 +28,18 @@ _MARGIN = 10
 class Texels:
     """A square picture as the processor reads it fastest, in steps of 1 / 65535 of its range.
 
-    pairs  (side * side,) uint32, row by row: a texel in the lower 16 bits, the one below it in the upper.  So the four
-           around a place are two neighbours in memory, and most often one line of cache.
     A texel is worth low + step * its bits.
     """
 
     pairs: NDArray[np.uint32]
+    """(side * side,) uint32, row by row: a texel in the lower 16 bits, the one below it in the upper.  So the four
+    around a place are two neighbours in memory, and most often one line of cache."""
     side: int
     low: np.float32
     step: np.float32
 
     @classmethod
-    def of(cls, picture: NDArray[np.float32]) -> Texels:
+    def of(cls, picture: Pictures) -> Texels:
         low = picture.min()
         step = np.float32(max((picture.max() - low) / 65535, 1e-30))
         bits = np.round((picture - low) / step).astype(np.uint32)
@@ -49,16 +51,46 @@ class Texels:
         return replace(self, low=self.low * np.float32(gain), step=self.step * np.float32(gain))
 
 
-def places_of(
-    side: NDArray[np.float64],
-    radius: NDArray[np.float64],
-    x: NDArray[np.float64],
-    y: NDArray[np.float64],
-    angle: NDArray[np.float64],
-) -> NDArray[np.float64]:
-    """Where disks lie as they are painted: (R, 6) of x, y, u0, v0, cosine, sine (`_paint_disk`).
+class PlacedDisc(NamedTuple):
+    """A disc at each key."""
 
-    All (R,): side of the texels; radius, x, y in pixels; angle in radians, counter-clockwise in the picture.
+    texels: Texels
+    radius: float
+    """[pixels]"""
+    x: Floats
+    y: Floats
+    """x and y (K,) [pixels]."""
+    angle: Floats
+    """(K,) [radians]."""
+
+
+@dataclass(frozen=True, eq=False)
+class Plane:
+    """A tiled background with discs before it, at each of K keys."""
+
+    shape: tuple[int, int]
+    frame: Floats
+    """(K,) frames of the keys, rising."""
+    tile: Pictures
+    """(h, w) radiance of the background, repeated."""
+    pan: Floats
+    tilt: Floats
+    """pan and tilt (K,), offset from which the background is seen [pixels]."""
+    discs: Sequence[PlacedDisc]
+    """From the back."""
+    unmoved: Pictures | None = None
+    """(rows, columns), the background seen from (0, 0), where it is known."""
+
+
+def places_of(side: Floats, radius: Floats, x: Floats, y: Floats, angle: Floats) -> Floats:
+    """Places of disks for painting: (R, 6) of x, y, u0, v0, cosine, sine (`_paint_disk`).
+
+    Args:
+        side: (R,) of the texels.
+        radius: (R,) [pixels].
+        x: (R,) [pixels].
+        y: (R,) [pixels].
+        angle: (R,) [radians], counter-clockwise in the picture.
     """
     scale = (side - 2 * _MARGIN) / (2 * radius)
     cosine, sine = scale * np.cos(angle), scale * np.sin(angle)
@@ -67,11 +99,15 @@ def places_of(
     return np.stack([x, y, u, v, cosine, sine], axis=1)
 
 
-def prefiltered(texture: NDArray[np.floating], radius: float) -> NDArray[np.float32]:
-    """Resampled to `TEXELS_PER_PIXEL` over the disk's square and averaged over a pixel's area, whatever the angle.
+def prefiltered(texture: NDArray[np.floating], radius: float) -> Pictures:
+    """The texture (n, n) at `TEXELS_PER_PIXEL`, averaged over a pixel's area, whatever the angle.
 
     Resampling by area (m texels a pixel) and bilinear interpolation blur too, by 1 / 12 m^2 and 1 / 6 m^2
-    pixels^2; a box of side sqrt(1 - 3 / m^2) makes up the pixel's 1 / 12.  The border is repeated outward.
+    pixels^2; a box of side sqrt(1 - 3 / m^2) makes up the pixel's 1 / 12.
+
+    Args:
+        texture: of the square around the disk; its border is repeated outward.
+        radius: of the disk [pixels].
     """
     texels = max(2, round(2 * radius * TEXELS_PER_PIXEL))
     checked_memory(20 * texels**2, f"a disk of radius {radius:g} pixels")
@@ -82,7 +118,7 @@ def prefiltered(texture: NDArray[np.floating], radius: float) -> NDArray[np.floa
     return np.asarray(cv2.filter2D(wide, -1, box, borderType=cv2.BORDER_REPLICATE), np.float32)
 
 
-def _turned_box(side: float) -> NDArray[np.float32]:
+def _turned_box(side: float) -> Pictures:
     """Kernel (n, n): a square of this side [texels] about the middle, averaged over all angles; sum 1."""
     fine, reach = 16, int(np.ceil(side / np.sqrt(2) + 0.5))
     size = 2 * reach + 1
@@ -91,7 +127,7 @@ def _turned_box(side: float) -> NDArray[np.float32]:
     towards_side = np.arccos(np.clip(side / 2 / np.maximum(distance, side / 2), 0, 1))
     share = np.clip(1 - towards_side / (np.pi / 4), 0, 1)
     kernel = share.reshape(size, fine, size, fine).mean(axis=(1, 3))
-    normed: NDArray[np.float32] = (kernel / kernel.sum()).astype(np.float32)
+    normed: Pictures = (kernel / kernel.sum()).astype(np.float32)
     return normed
 
 
@@ -99,9 +135,9 @@ BAND = 16
 """Rows of a picture that are painted at a time."""
 
 KEYS = 64
-"""Keys for which a band of rows is painted before the next one.  From key to key a disk turns by three texels at most,
-so the texels of a band are read again and again while they are in the processor's second cache (0.6 MB for the default
-disk); key by key the whole texture, 5 MB, would pass through it each time."""
+"""Keys for which a band of rows is painted before the next one.  From key to key a disk turns by three texels at most.
+So the texels of a band are read again while they are in the processor's second cache (0.6 MB for the default disk).
+Key by key the whole texture, 5 MB, would pass through it each time."""
 
 _TILE, _TILE_ROWS, _TILE_COLUMNS, _ROWS, _COLUMNS, _UNMOVED, _OUT, _SIZE, _KEYS, _FIRST_KEY, _FIRST_DISC, _STOP_DISC = (
     range(12)
@@ -120,22 +156,24 @@ def paint_scenes(
     tickets: NDArray[np.int64],
     parts: int,
     scenes: NDArray[np.int64],
-    pan: NDArray[np.float64],
-    tilt: NDArray[np.float64],
+    pan: Floats,
+    tilt: Floats,
     textures: NDArray[np.int64],
-    numbers: NDArray[np.float64],
-    places: NDArray[np.float64],
+    numbers: Floats,
+    places: Floats,
 ) -> None:
     """Pictures of tiles with disks before them: the parts, a band of rows at some keys, that this thread gets hold of.
 
-    tickets     (1, 8) int64, shared: [0, 0] is the next part, of `parts`
-    scenes      (N, 13) int64: address, rows and columns of the tile; rows and columns of the picture; address of the
-                tile as seen from (0, 0), or 0; address of the first picture, bytes to the next, how many there are, the
-                first one's number; the scene's disks, from and to; its first part (`parts_of`)
-    pan, tilt   (M,) where the tile is seen from, a picture after another
-    textures    (D, 3) int64: address of the texels (`Texels`), their side, row of `places` of the first picture
-    numbers     (D, 3): radius, low, step
-    places      (R, 6): of `places_of`
+    Args:
+        tickets: (1, 8) int64, shared: [0, 0] is the next part, of `parts`.
+        scenes: (N, 13) int64: address, rows and columns of the tile; rows and columns of the picture; address of the
+            tile as seen from (0, 0), or 0; address of the first picture, bytes to the next, how many there are, the
+            first one's number; the scene's disks, from and to; its first part (`parts_of`).
+        pan: (M,) offset from which the tile is seen, a picture after another.
+        tilt: (M,) likewise.
+        textures: (D, 3) int64: address of the texels (`Texels`), their side, row of `places` of the first picture.
+        numbers: (D, 3): radius, low, step.
+        places: (R, 6): of `places_of`.
     """
     n = 0
     while True:
@@ -177,14 +215,14 @@ def paint_scenes(
 
 
 @njit(inline="always")
-def _in_view(place: NDArray[np.float64], radius: float, top: int, bottom: int, columns: int) -> bool:
+def _in_view(place: Floats, radius: float, top: int, bottom: int, columns: int) -> bool:
     """Whether a disk at a place (`places_of`) is seen in rows from `top` to `bottom`."""
     reach = radius + 1
     return -reach < place[0] < columns - 1 + reach and top - reach < place[1] < bottom - 1 + reach  # type: ignore[no-any-return]
 
 
 @njit(cache=True, nogil=True)
-def paint_tile(tile: NDArray[np.float32], pan: float, tilt: float, above: int, picture: NDArray[np.float32]) -> None:
+def paint_tile(tile: Pictures, pan: float, tilt: float, above: int, picture: Pictures) -> None:
     """Rows from `above` on of the repeated tile seen from offset (pan, tilt), bilinear."""
     height, width = tile.shape
     left, top = int(np.floor(pan)), int(np.floor(tilt))
@@ -203,7 +241,7 @@ def paint_tile(tile: NDArray[np.float32], pan: float, tilt: float, above: int, p
 
 @njit(cache=True, nogil=True, fastmath=True)
 def _paint_disk(
-    behind: NDArray[np.float32],
+    behind: Pictures,
     pairs: int,
     side: np.int32,
     low: np.float32,
@@ -216,12 +254,11 @@ def _paint_disk(
     cosine: float,
     sine: float,
     top: int,
-    picture: NDArray[np.float32],
+    picture: Pictures,
 ) -> None:
-    """The disk over what is behind it, rows from `top` on of the picture, another array; a pixel on the rim is covered
-    by the share inside (of a half-plane).
+    """The disk over the picture behind it, rows from `top` on, into another array; the rim is covered by area.
 
-    pairs: the address of the texels; side, low, step: see `Texels`; the picture's (column, row) is read at
+    Texels stand at the address `pairs`; side, low and step are those of `Texels`.  Pixel (column, row) is read at
     (u0 + cosine column - sine row, v0 + sine column + cosine row), bilinear.  Each row goes through short loops,
     places, texels, light: the first and the last are vectors then.  Nothing but the rim is blended.
     """
@@ -271,20 +308,14 @@ def _paint_disk(
 
 
 @njit(inline="always")
-def _copy(values: NDArray[np.float32], into: NDArray[np.float32]) -> None:
+def _copy(values: Pictures, into: Pictures) -> None:
     for i in range(len(values)):
         into[i] = values[i]
 
 
 @njit(cache=True, nogil=True, fastmath={"contract", "nnan", "nsz"})
 def _blend_rim(
-    behind: NDArray[np.float32],
-    start: int,
-    stop: int,
-    x: float,
-    dy: np.float32,
-    reach: np.float32,
-    row: NDArray[np.float32],
+    behind: Pictures, start: int, stop: int, x: float, dy: np.float32, reach: np.float32, row: Pictures
 ) -> None:
     """Pixels of a row that the disk covers in part."""
     back, light = behind[start:stop], row[start:stop]

@@ -1,6 +1,6 @@
 """Picture files: one as it is stored, and a folder or a list of them as the pictures of a film.
 
-Pillow decodes what has 8 bits a value, FFmpeg what has more (PNG and TIFF of 16 bits, EXR, HDR).  The orientation that
+Pillow decodes files of 8 bits a value, FFmpeg those of more (PNG and TIFF of 16 bits, EXR, HDR).  The orientation that
 EXIF states holds.  Colour profiles (ICC) are not read.
 """
 
@@ -14,11 +14,11 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from PIL import Image, UnidentifiedImageError
 
 from scenes.frames import ALONE, StoredPicture, stated_primaries, stated_transfer, stored
 from spikecam_env.errors import InputError
+from spikecam_env.types import Floats, Pictures
 from spikecam_env.untrusted import existing_file, read_table
 
 MOST_PICTURE_PIXELS = 1 << 27
@@ -41,8 +41,9 @@ SRGB_GAMMA = 2.2
 def read_picture(path: str | PathLike[str]) -> StoredPicture:
     """A picture file, upright.
 
-    Errors: InputError where there is none, it is damaged, not a picture, larger than MOST_PICTURE_PIXELS, holds several
-    pictures or transparent pixels.
+    Raises:
+        InputError: the file is missing, damaged, no picture or larger than MOST_PICTURE_PIXELS, or it holds several
+            pictures or transparent pixels.
     """
     source = existing_file(Path(path))
     try:
@@ -65,7 +66,8 @@ def read_picture(path: str | PathLike[str]) -> StoredPicture:
 def pictures_in(folder: Path) -> list[Path]:
     """The pictures of a folder by the numbers in their names: img2 before img10.
 
-    Errors: InputError for a file that is no picture, fewer than two pictures, and a gap in their numbers.
+    Raises:
+        InputError: a file is no picture, there are fewer than two, or their numbers have a gap.
     """
     try:
         files = [p for p in folder.iterdir() if not p.name.startswith(".") and p.name not in NO_PICTURES]
@@ -84,11 +86,12 @@ def pictures_in(folder: Path) -> list[Path]:
     return files
 
 
-def pictures_timed(listing: Path) -> tuple[list[Path], NDArray[np.float64]]:
+def pictures_timed(listing: Path) -> tuple[list[Path], Floats]:
     """The pictures that a CSV file with the columns name and time_s lists, in its folder, and the time of each [s].
 
-    Errors: InputError, with the line, where it has other columns, a time is no number or not after the one before, or
-    a name leads out of the folder or to no file.
+    Raises:
+        InputError: columns differ, a time is no number or not after the one before, or a name leads out of the folder
+            or to no file.  The message has the line.
     """
     folder = listing.parent.resolve()
     files: list[Path] = []
@@ -126,7 +129,7 @@ def _by_pillow(image: Any, source: Path) -> StoredPicture:
     return StoredPicture(_upright(values, turn), "linear" if bits == 32 else transfer, primaries, bits)
 
 
-def _values(image: Image.Image, source: Path) -> tuple[NDArray[np.float32], int]:
+def _values(image: Image.Image, source: Path) -> tuple[Pictures, int]:
     """0..1, or floats as they are; and the bits of a value."""
     if image.mode.startswith("I;16") or (image.mode == "I" and image.format in ("PNG", "PPM")):
         return np.asarray(image, np.float32) / np.float32(65535), 16
@@ -162,7 +165,7 @@ def _by_ffmpeg(source: Path) -> StoredPicture:
 
 
 def check_size(width: int, height: int, source: Path | str) -> None:
-    """Errors: InputError for more than MOST_PICTURE_PIXELS."""
+    """Refuse more than MOST_PICTURE_PIXELS."""
     if width * height > MOST_PICTURE_PIXELS:
         raise InputError(
             f"{source} has {height} x {width} pixels; at most {MOST_PICTURE_PIXELS} are read, make it smaller first"
@@ -196,7 +199,7 @@ def _stated(image: Image.Image, source: Path) -> tuple[str | None, str]:
     return f"gamma{1 / gamma:.4f}", "bt709"
 
 
-def _upright(values: NDArray[np.float32], orientation: int) -> NDArray[np.float32]:
+def _upright(values: Pictures, orientation: int) -> Pictures:
     """A picture (h, w[, 3]) turned as EXIF's orientation 1..8 says (2, 4, 5, 7 are mirrored)."""
     if orientation in (2, 4, 5, 7):
         values = values[:, ::-1]
@@ -210,7 +213,7 @@ def _natural(name: str) -> list[tuple[int, int, str]]:
 
 
 def _no_gap(folder: Path, files: list[Path]) -> None:
-    """Errors: InputError where the last numbers of the names rise by one step but for some: a picture is missing."""
+    """Refuse names whose last numbers rise by one step but for some: a picture is missing."""
     numbers = [re.findall(r"\d+", p.stem) for p in files]
     if not all(numbers):
         return

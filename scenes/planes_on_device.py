@@ -16,13 +16,13 @@ from numpy.typing import NDArray
 from torch import Tensor
 from torch.nn.functional import grid_sample
 
-from scenes.painted_disk import Texels, places_of
-from scenes.planes import Plane
+from scenes.painted_disk import Plane, Texels, places_of
 from spikecam_env.sensor import Keyframes
 from spikecam_env.sensor.kernels.cuda import checked_device
+from spikecam_env.types import Floats, Pictures
 
 TOGETHER = 1 << 25
-"""Pixels that are painted at a time: 1 GB of what is computed on the way."""
+"""Pixels that are painted at a time: 1 GB of intermediate results."""
 
 KEPT = 512
 """Textures and tiles that are kept on devices: those of all tasks."""
@@ -35,38 +35,49 @@ def planes_on(planes: Sequence[Plane], device: str | torch.device) -> list[Keyfr
     """As `scenes.planes.painted_planes`, radiance being a tensor on the device.
 
     Planes that show the same textures are painted in one go, since a key is a picture of its own.
-    Raises InputError for a device that is not there.
+
+    Raises:
+        InputError: the device is missing.
     """
-    there = checked_device(device, "leave device out")
+    checked = checked_device(device, "leave device out")
     groups: dict[Any, list[int]] = {}
     for number, plane in enumerate(planes):
         groups.setdefault(_look(plane), []).append(number)
     light: dict[int, Tensor] = {}
     for numbers in groups.values():
         alike = [planes[number] for number in numbers]
-        pictures = PlanePainter(alike[0], there).painted(alike)
+        pictures = PlanePainter(alike[0], checked).painted(alike)
         light |= zip(numbers, pictures.split([len(plane.frame) for plane in alike]), strict=True)
-    return [on_device(plane.frame, light[number]) for number, plane in enumerate(planes)]
+    return [keys_of(plane.frame, light[number]) for number, plane in enumerate(planes)]
 
 
 def repeated_on(
     array: NDArray[Any],
-    made: Callable[[NDArray[Any]], NDArray[np.float32]],
-    frame: NDArray[np.float64],
-    first: tuple[NDArray[np.float64], NDArray[np.float64]],
+    made: Callable[[NDArray[Any]], Pictures],
+    frame: Floats,
+    first: tuple[Floats, Floats],
     shape: tuple[int, int],
     step: int,
     device: str | torch.device,
 ) -> Keyframes:
-    """Keys at frames (K,) of a repeated tile, made of an array, whose sample `first` (x, y), (K,) each, is the first
-    pixel; step: samples from pixel to pixel."""
+    """Keys of a repeated tile.
+
+    Args:
+        array: from which `made` makes the tile (h, w).
+        made: is called once for an array.
+        frame: (K,) of the keys.
+        first: x and y (K,) of the first pixel [samples].
+        shape: (rows, columns) of the picture.
+        step: samples from pixel to pixel.
+        device: on which it is painted.
+    """
     tile = uploaded(array, checked_device(device, "leave device out"), made)
     numbers = torch.from_numpy(tile_numbers(*first, tile.shape).astype(np.float32)).to(tile.device)
     many = max(1, TOGETHER // (shape[0] * shape[1]))
-    return on_device(frame, torch.cat([tile_on(tile, some, shape, step) for some in numbers.split(many)]))
+    return keys_of(frame, torch.cat([tile_on(tile, some, shape, step) for some in numbers.split(many)]))
 
 
-def on_device(frame: NDArray[np.float64], radiance: Tensor) -> Keyframes:
+def keys_of(frame: Floats, radiance: Tensor) -> Keyframes:
     """Keys at frames (K,) whose light (K, H, W) float32 lies on a device; known to be right."""
     pictures: Any = radiance
     return Keyframes.known(frame, pictures)
@@ -84,12 +95,12 @@ class PlanePainter:
         """(K, H, W) float32, the keys of one plane after those of another."""
         numbers = self.numbers(planes)
         still = bool((numbers[:, :OF_TILE] == numbers[:1, :OF_TILE]).all())
-        there = torch.from_numpy(numbers).to(self._device)
+        on_device = torch.from_numpy(numbers).to(self._device)
         many = max(1, TOGETHER // (self._shape[0] * self._shape[1]))
-        return torch.cat([self.paint(some, still) for some in there.split(many)])
+        return torch.cat([self.paint(some, still) for some in on_device.split(many)])
 
-    def numbers(self, planes: Sequence[Plane]) -> NDArray[np.float32]:
-        """What is to be known of each key, (K, OF_TILE + OF_DISC for each disc)."""
+    def numbers(self, planes: Sequence[Plane]) -> Pictures:
+        """(K, OF_TILE + OF_DISC for each disc) numbers of each key."""
         pan, tilt = (np.concatenate([getattr(plane, name) for plane in planes]) for name in ("pan", "tilt"))
         of_keys = [tile_numbers(pan, tilt, self._tile.shape)]
         for d, (_, texels, radius) in enumerate(self._discs):
@@ -99,7 +110,7 @@ class PlanePainter:
         return np.concatenate(of_keys, axis=1).astype(np.float32)
 
     def paint(self, numbers: Tensor, still: bool = False) -> Tensor:
-        """(K, H, W) light, from `numbers` on the device.  still: the tile lies in each key as in the first."""
+        """(K, H, W) light, from `numbers` on the device; with `still` the tile lies in each key as in the first."""
         picture = tile_on(self._tile, numbers[:1] if still else numbers, self._shape)
         for d, (bits, texels, radius) in enumerate(self._discs):
             first = OF_TILE + d * OF_DISC
@@ -107,14 +118,14 @@ class PlanePainter:
         return picture.expand(len(numbers), *self._shape)
 
 
-def tile_numbers(x: NDArray[np.float64], y: NDArray[np.float64], shape: Sequence[int]) -> NDArray[np.float64]:
+def tile_numbers(x: Floats, y: Floats, shape: Sequence[int]) -> Floats:
     """(K, OF_TILE) of a tile of `shape`, seen from places x, y (K,) [texels]."""
     left, top = np.floor(x), np.floor(y)
     return np.stack([left % shape[1], top % shape[0], x - left, y - top], axis=1)
 
 
 def tile_on(tile: Tensor, numbers: Tensor, shape: tuple[int, int], step: int = 1) -> Tensor:
-    """(K, H, W): a repeated tile, bilinear; numbers (K, OF_TILE) or more; step: texels from pixel to pixel."""
+    """(K, H, W): a repeated tile, bilinear, from numbers (K, OF_TILE) or more, with `step` texels a pixel."""
     left, top, right_share, lower_share = (numbers[:, i, None, None] for i in range(OF_TILE))
     row = top.long() + step * torch.arange(shape[0], device=tile.device)[None, :, None]
     column = left.long() + step * torch.arange(shape[1], device=tile.device)[None, None, :]
@@ -126,7 +137,7 @@ def tile_on(tile: Tensor, numbers: Tensor, shape: tuple[int, int], step: int = 1
 
 
 def _over(behind: Tensor, bits: Tensor, texels: Texels, radius: float, places: Tensor) -> Tensor:
-    """A disc over what is behind it, (K or 1, H, W); places (K, OF_DISC)."""
+    """A disc over the picture behind it (K or 1, H, W), at places (K, OF_DISC)."""
     x, y, u0, v0, cosine, sine = (places[:, i, None, None] for i in range(OF_DISC))
     row = torch.arange(behind.shape[1], device=bits.device, dtype=torch.float32)[None, :, None]
     column = torch.arange(behind.shape[2], device=bits.device, dtype=torch.float32)[None, None, :]
@@ -140,7 +151,7 @@ def _over(behind: Tensor, bits: Tensor, texels: Texels, radius: float, places: T
 
 
 def _look(plane: Plane) -> tuple[Any, ...]:
-    """What planes that are painted in one go have in common."""
+    """Features common to planes that are painted in one go."""
     discs = (
         (id(disc.texels.pairs), float(disc.texels.low), float(disc.texels.step), disc.radius) for disc in plane.discs
     )
@@ -154,9 +165,9 @@ def _bits(texels: Texels, device: torch.device) -> Tensor:
 
 
 def uploaded(
-    array: NDArray[Any], device: torch.device, made: Callable[[NDArray[Any]], NDArray[np.float32]] = np.asarray
+    array: NDArray[Any], device: torch.device, made: Callable[[NDArray[Any]], Pictures] = np.asarray
 ) -> Tensor:
-    """What is made of an array that is never written to, on a device; the last KEPT are kept there."""
+    """A tensor on a device, made of an array that is never written to; the last KEPT are kept there."""
     key = id(array), str(device)
     if key not in _UPLOADED:
         _UPLOADED[key] = array, torch.from_numpy(np.ascontiguousarray(made(array))).to(device)

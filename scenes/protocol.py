@@ -1,4 +1,4 @@
-"""What a scene is: light over time on the sensor's grid, and the truth about it.
+"""A scene: light over time on the sensor's grid, and the truth about it.
 
 Coordinates: x to the right, y down, in pixels; pixel (row r, column c) has its centre at (x, y) = (c, r).
 Time is in frames: frame n is exposed over [n, n + 1).  Radiance is linear; 1.0 makes the nominal pixel
@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from spikecam_env.checked import LARGEST_COUNT, checked_number
 from spikecam_env.errors import InputError
+from spikecam_env.types import Pictures
 
 if TYPE_CHECKING:
     from spikecam_env.sensor import Keyframes
@@ -53,8 +54,9 @@ class Gaze:
     def fixed(cls, pan: float, tilt: float) -> Gaze:
         """A camera at rest at this offset [pixels].
 
-        >>> Gaze.fixed(2.0, 0.0).rate
-        (0.0, 0.0)
+        Example:
+            >>> Gaze.fixed(2.0, 0.0).rate
+            (0.0, 0.0)
         """
         return cls((pan, tilt), (pan, tilt), (0.0, 1.0))
 
@@ -77,30 +79,31 @@ class Gaze:
 class Truth:
     """Ground truth at one instant.
 
-    radiance   (H, W) float32, linear
-    flow       (H, W, 2) float32, velocity of the surface seen in the pixel [pixels/frame], x then y
-    object_id  (H, W) int32, 0 is the background
-    depth      (H, W) float32 or None where the scene is flat
-    poses      object name -> its pose, as the scene documents it; "camera" is the gaze (pan, tilt) [pixels]
-
-    >>> truth = SlidingTexture((16, 24)).truth(0.5)
-    >>> truth.radiance.shape, truth.flow.shape, truth.depth is None
-    ((16, 24), (16, 24, 2), True)
+    Example:
+        >>> truth = SlidingTexture((16, 24)).truth(0.5)
+        >>> truth.radiance.shape, truth.flow.shape, truth.depth is None
+        ((16, 24), (16, 24, 2), True)
     """
 
-    radiance: NDArray[np.float32]
-    flow: NDArray[np.float32]
+    radiance: Pictures
+    """(H, W) float32, linear."""
+    flow: Pictures
+    """(H, W, 2) float32, velocity of the surface seen in the pixel [pixels/frame], x then y."""
     object_id: NDArray[np.int32]
-    depth: NDArray[np.float32] | None = None
+    """(H, W) int32, 0 is the background."""
+    depth: Pictures | None = None
+    """(H, W) float32 or None where the scene is flat."""
     poses: dict[str, tuple[float, ...]] = field(default_factory=dict)
+    """Object name -> its pose, as the scene documents it; "camera" is the gaze (pan, tilt) [pixels]."""
 
 
 @runtime_checkable
 class Scene(Protocol):
     """Light over time.  A scene holds no state: the same call gives the same light, in any order.
 
-    >>> isinstance(RotatingDisk((16, 24)), Scene)
-    True
+    Example:
+        >>> isinstance(RotatingDisk((16, 24)), Scene)
+        True
     """
 
     @property
@@ -116,8 +119,11 @@ class Scene(Protocol):
     def radiance(self, start: int, stop: int, gaze: Gaze | None = None) -> Keyframes:
         """Linear float32 keys that cover frames [start, stop].
 
-        Without gaze the keys lie on an absolute grid of integer frames: a key's time and light do not
-        depend on how the stream is cut into calls.
+        Args:
+            start: first frame.
+            stop: last frame.
+            gaze: of the camera.  Without one, keys lie on an absolute grid of whole frames: a key's time and light do
+                not depend on how the stream is cut into calls.
         """
         ...
 
@@ -131,10 +137,7 @@ class Placed(Scene, Protocol):
     """A scene of things that can be followed."""
 
     def places(self, frame: float, gaze: Gaze | None = None) -> dict[str, tuple[float, float]]:
-        """Where the middle of everything that moves is seen, by name: (x, y) [pixels], also outside the picture.
-
-        Nothing is rendered for it.
-        """
+        """Where the middle of everything that moves is seen, by name: (x, y) [pixels], also outside the picture."""
         ...
 
 
@@ -145,3 +148,19 @@ class Dimmable(Scene, Protocol):
     def lit(self, gain: float) -> Scene:
         """The same with `gain` times its light."""
         ...
+
+
+class Derived:
+    """Base of a scene made of `scene`, whose light it shows in its own way; size and frame rate are the same."""
+
+    scene: Scene
+
+    @property
+    def shape(self) -> tuple[int, int]:
+        """(rows, columns)."""
+        return self.scene.shape
+
+    @property
+    def frame_rate_hz(self) -> float:
+        """Frames a second."""
+        return self.scene.frame_rate_hz

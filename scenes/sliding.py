@@ -15,13 +15,13 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from scenes.keys import interval_for, key_frames, paint_keys
-from scenes.planes import on_device
 from scenes.protocol import FRAME_RATES_HZ, MOST_LIGHT, MOST_PLACE, Gaze, Truth
 from scenes.textures import dead_leaves
 from spikecam_env.checked import checked_memory, checked_number, checked_shape
 from spikecam_env.compiled import njit
 from spikecam_env.errors import InputError
 from spikecam_env.sensor import Keyframes
+from spikecam_env.types import Floats, Pictures
 
 SAMPLES_PER_PIXEL = 4
 
@@ -29,21 +29,25 @@ SAMPLES_PER_PIXEL = 4
 class SlidingTexture:
     """Scene: one texture over the whole picture at constant velocity.
 
-    shape           (rows, columns) of the sensor
-    velocity_px_s   (x, y) [pixels/s]
-    texture         (n, m) in [0, 1], repeated; its values are little squares of light.  Default: fallen leaves
-    texel_px        size of such a square [pixels]; with 0.5 the default texture repeats every 256 pixels
-    light           radiance of texture value 0 and 1: (dark, bright)
-    seed            of the default texture
-    frame_rate_hz   frames a second
-    motion_per_key  most the texture may move between two keys [pixels], as far as whole frames allow
-
     Truth: all is object 0; poses["texture"] is where its upper left corner has gone, (x, y) [pixels].
-    Errors: InputError for a value out of range, by name.
 
-    >>> scene = SlidingTexture((16, 24), velocity_px_s=(20_000.0, 0.0))
-    >>> scene.truth(0.5).flow[0, 0].tolist()  # pixels a frame
-    [0.5, 0.0]
+    Args:
+        shape: (rows, columns) of the sensor.
+        velocity_px_s: (x, y) [pixels/s].
+        texture: (n, m) in [0, 1], repeated; its values are little squares of light.  Default: fallen leaves.
+        texel_px: size of such a square [pixels]; with 0.5 the default texture repeats every 256 pixels.
+        light: radiance of texture value 0 and 1: (dark, bright).
+        seed: of the default texture.
+        frame_rate_hz: frames a second.
+        motion_per_key: most the texture may move between two keys [pixels], as far as whole frames allow.
+
+    Raises:
+        InputError: a value is out of range, by name.
+
+    Example:
+        >>> scene = SlidingTexture((16, 24), velocity_px_s=(20_000.0, 0.0))
+        >>> scene.truth(0.5).flow[0, 0].tolist()  # pixels a frame
+        [0.5, 0.0]
     """
 
     def __init__(
@@ -70,7 +74,7 @@ class SlidingTexture:
         return f"SlidingTexture(shape={self.shape}, velocity_px_s={self.velocity_px_s})"
 
     def radiance(self, start: int, stop: int, gaze: Gaze | None = None, *, device: Any = None) -> Keyframes:
-        """Keys that cover frames [start, stop], see `scenes.keys.key_frames`; device: as of `PlanarScene.radiance`."""
+        """Keys that cover frames [start, stop]; arguments are those of `scenes.planes.PlanarScene.radiance`."""
         speed = float(np.hypot(*self.velocity(gaze)))
         frame = key_frames(self.shape, start, stop, interval_for(speed, self.motion_per_key), gaze)
         if device is not None:
@@ -113,8 +117,10 @@ class SlidingTexture:
         x, y = (-SAMPLES_PER_PIXEL * (corner + 0.5) for corner in self.corner_at(frame, gaze))
         return x, y
 
-    def _on(self, device: Any, frame: NDArray[np.float64], gaze: Gaze | None) -> Keyframes:
-        found: Keyframes = on_device().repeated_on(
+    def _on(self, device: Any, frame: Floats, gaze: Gaze | None) -> Keyframes:
+        from scenes.planes_on_device import repeated_on  # torch takes seconds
+
+        return repeated_on(
             self._samples,
             lambda samples: _in_order(samples, self._period),
             frame,
@@ -123,14 +129,13 @@ class SlidingTexture:
             SAMPLES_PER_PIXEL,
             device,
         )
-        return found
 
-    def _paint(self, frame: float, gaze: Gaze | None, picture: NDArray[np.float32]) -> None:
+    def _paint(self, frame: float, gaze: Gaze | None, picture: Pictures) -> None:
         x, y = self._first_sample(frame, gaze)
         _paint(self._samples, x % self._period, y % len(self._samples), picture)
 
 
-def _area_average(values: NDArray[np.floating], texel_px: float) -> NDArray[np.float64]:
+def _area_average(values: NDArray[np.floating], texel_px: float) -> Floats:
     """Averages over a pixel along the first axis, SAMPLES_PER_PIXEL a pixel; the first is that of a pixel whose
     upper edge is the texture's.
 
@@ -145,18 +150,18 @@ def _area_average(values: NDArray[np.floating], texel_px: float) -> NDArray[np.f
     middle = np.arange(samples) * (texels / samples) + pixel / 2
     integral = np.concatenate([np.zeros((1, *values.shape[1:])), np.cumsum(values, axis=0, dtype=np.float64)])
 
-    def up_to(place: NDArray[np.float64]) -> NDArray[np.float64]:
+    def up_to(place: Floats) -> Floats:
         turns, rest = np.divmod(place, texels)
         whole = np.minimum(rest.astype(int), texels - 1)
         part = (rest - whole)[:, None]
-        light: NDArray[np.float64] = integral[whole] + part * values[whole] + turns[:, None] * integral[-1]
+        light: Floats = integral[whole] + part * values[whole] + turns[:, None] * integral[-1]
         return light
 
-    average: NDArray[np.float64] = (up_to(middle + half) - up_to(middle - half)) / (2 * half)
+    average: Floats = (up_to(middle + half) - up_to(middle - half)) / (2 * half)
     return average
 
 
-def _by_phase(samples: NDArray[np.float32], columns: int) -> NDArray[np.float32]:
+def _by_phase(samples: Pictures, columns: int) -> Pictures:
     """(rows, SAMPLES_PER_PIXEL, n): samples (rows, period) so that those a pixel apart are neighbours, on and on over
     the period's end for as many columns as a picture has from any of them."""
     period = samples.shape[1]
@@ -165,14 +170,14 @@ def _by_phase(samples: NDArray[np.float32], columns: int) -> NDArray[np.float32]
     return np.ascontiguousarray(samples[:, place])
 
 
-def _in_order(samples: NDArray[np.float32], period: int) -> NDArray[np.float32]:
+def _in_order(samples: Pictures, period: int) -> Pictures:
     """(rows, period), of `_by_phase`."""
     place = np.arange(period)
     return samples[:, place % SAMPLES_PER_PIXEL, place // SAMPLES_PER_PIXEL]
 
 
 @njit(cache=True, nogil=True)
-def _paint(samples: NDArray[np.float32], x: float, y: float, picture: NDArray[np.float32]) -> None:
+def _paint(samples: Pictures, x: float, y: float, picture: Pictures) -> None:
     """The picture whose first pixel is sample (x, y), bilinear; all pixels lie alike between samples."""
     height, (rows, columns) = samples.shape[0], picture.shape
     left, top = int(x), int(y)
@@ -194,7 +199,7 @@ def _paint(samples: NDArray[np.float32], x: float, y: float, picture: NDArray[np
 def _check(
     shape: tuple[int, int],
     velocity_px_s: tuple[float, float],
-    texture: NDArray[np.float32],
+    texture: Pictures,
     texel_px: float,
     light: tuple[float, float],
     frame_rate_hz: float,

@@ -11,21 +11,23 @@ from collections.abc import Callable, Sequence
 import cv2
 import numpy as np
 import scipy
-from numpy.typing import NDArray
 
 from spikecam_env.compiled import njit
 from spikecam_env.errors import InputError, unknown_name
+from spikecam_env.types import Floats, Pictures
 
-Texture = NDArray[np.float32]
+Texture = Pictures
 
 
 def random_texture(rng: np.random.Generator, size: int, kinds: Sequence[str] | None = None) -> Texture:
     """One texture of a kind drawn evenly from `kinds` (default: all of `TEXTURES`).
 
-    Errors: InputError for size < 8 or an unknown kind.
+    Raises:
+        InputError: size < 8 or an unknown kind.
 
-    >>> random_texture(np.random.default_rng(0), 64, kinds=["checker", "stripes"]).shape
-    (64, 64)
+    Example:
+        >>> random_texture(np.random.default_rng(0), 64, kinds=["checker", "stripes"]).shape
+        (64, 64)
     """
     if size < 8:
         raise InputError(f"texture size is {size}; it must be at least 8 pixels")
@@ -39,9 +41,10 @@ def random_texture(rng: np.random.Generator, size: int, kinds: Sequence[str] | N
 def fractal_noise(rng: np.random.Generator, size: int) -> Texture:
     """Noise of amplitude 1 / f^p, p in [0.8, 2], as in natural images (p about 1).  Tiles.
 
-    >>> texture = fractal_noise(np.random.default_rng(0), 64)
-    >>> texture.shape, bool(texture.min() >= 0 and texture.max() <= 1)
-    ((64, 64), True)
+    Example:
+        >>> texture = fractal_noise(np.random.default_rng(0), 64)
+        >>> texture.shape, bool(texture.min() >= 0 and texture.max() <= 1)
+        ((64, 64), True)
     """
     frequency = np.hypot(np.fft.fftfreq(size)[:, None], np.fft.rfftfreq(size)[None, :])
     frequency[0, 0] = np.inf
@@ -54,9 +57,10 @@ def dead_leaves(rng: np.random.Generator, size: int) -> Texture:
 
     Source: Lee, Mumford and Huang, "Occlusion models for natural images", IJCV 2001.  Tiles.
 
-    >>> texture = dead_leaves(np.random.default_rng(0), 64)
-    >>> texture.shape, bool(texture.min() >= 0 and texture.max() <= 1)
-    ((64, 64), True)
+    Example:
+        >>> texture = dead_leaves(np.random.default_rng(0), 64)
+        >>> texture.shape, bool(texture.min() >= 0 and texture.max() <= 1)
+        ((64, 64), True)
     """
     image = np.full((size, size), rng.random(), np.float32)
     smallest, largest = max(2.0, size / 100), size / 4
@@ -72,9 +76,10 @@ def dead_leaves(rng: np.random.Generator, size: int) -> Texture:
 def stripes(rng: np.random.Generator, size: int) -> Texture:
     """Waves in one direction, from a sine to hard stripes.  Tiles.
 
-    >>> texture = stripes(np.random.default_rng(0), 64)
-    >>> texture.shape, bool(texture.min() >= 0 and texture.max() <= 1)
-    ((64, 64), True)
+    Example:
+        >>> texture = stripes(np.random.default_rng(0), 64)
+        >>> texture.shape, bool(texture.min() >= 0 and texture.max() <= 1)
+        ((64, 64), True)
     """
     along, across = _wave_numbers(rng, size / 10)
     y, x = _grid(size)
@@ -86,9 +91,10 @@ def stripes(rng: np.random.Generator, size: int) -> Texture:
 def checker(rng: np.random.Generator, size: int) -> Texture:
     """Two crossed waves: a checkerboard at any angle, soft to hard.  Tiles.
 
-    >>> texture = checker(np.random.default_rng(0), 64)
-    >>> texture.shape, bool(texture.min() >= 0 and texture.max() <= 1)
-    ((64, 64), True)
+    Example:
+        >>> texture = checker(np.random.default_rng(0), 64)
+        >>> texture.shape, bool(texture.min() >= 0 and texture.max() <= 1)
+        ((64, 64), True)
     """
     along, across = _wave_numbers(rng, size / 14)
     y, x = _grid(size)
@@ -101,9 +107,10 @@ def checker(rng: np.random.Generator, size: int) -> Texture:
 def blobs(rng: np.random.Generator, size: int) -> Texture:
     """Smoothed noise pushed to two levels: islands of one scale.  Tiles.
 
-    >>> texture = blobs(np.random.default_rng(0), 64)
-    >>> texture.shape, bool(texture.min() >= 0 and texture.max() <= 1)
-    ((64, 64), True)
+    Example:
+        >>> texture = blobs(np.random.default_rng(0), 64)
+        >>> texture.shape, bool(texture.min() >= 0 and texture.max() <= 1)
+        ((64, 64), True)
     """
     grain = rng.standard_normal((size, size))
     noise = scipy.ndimage.gaussian_filter(grain, rng.uniform(0.004, 0.03) * size, mode="wrap")
@@ -113,9 +120,10 @@ def blobs(rng: np.random.Generator, size: int) -> Texture:
 def rectangles(rng: np.random.Generator, size: int) -> Texture:
     """Upright rectangles of random grey that cover each other.  Tiles.
 
-    >>> texture = rectangles(np.random.default_rng(0), 64)
-    >>> texture.shape, bool(texture.min() >= 0 and texture.max() <= 1)
-    ((64, 64), True)
+    Example:
+        >>> texture = rectangles(np.random.default_rng(0), 64)
+        >>> texture.shape, bool(texture.min() >= 0 and texture.max() <= 1)
+        ((64, 64), True)
     """
     image = np.full((size, size), rng.random(), np.float32)
     for height, width in rng.integers(max(2, size // 120), max(4, size // 5), (150, 2)):
@@ -128,9 +136,10 @@ def rectangles(rng: np.random.Generator, size: int) -> Texture:
 def gradient(rng: np.random.Generator, size: int) -> Texture:
     """Very smooth shading.  Tiles.
 
-    >>> texture = gradient(np.random.default_rng(0), 64)
-    >>> texture.shape, bool(texture.min() >= 0 and texture.max() <= 1)
-    ((64, 64), True)
+    Example:
+        >>> texture = gradient(np.random.default_rng(0), 64)
+        >>> texture.shape, bool(texture.min() >= 0 and texture.max() <= 1)
+        ((64, 64), True)
     """
     noise = scipy.ndimage.gaussian_filter(rng.standard_normal((size, size)), rng.uniform(0.08, 0.2) * size, mode="wrap")
     return _stretch(noise)
@@ -139,9 +148,10 @@ def gradient(rng: np.random.Generator, size: int) -> Texture:
 def glyphs(rng: np.random.Generator, size: int) -> Texture:
     """Lines of letters and digits, dark on light or light on dark.
 
-    >>> texture = glyphs(np.random.default_rng(0), 64)
-    >>> texture.shape, bool(texture.min() >= 0 and texture.max() <= 1)
-    ((64, 64), True)
+    Example:
+        >>> texture = glyphs(np.random.default_rng(0), 64)
+        >>> texture.shape, bool(texture.min() >= 0 and texture.max() <= 1)
+        ((64, 64), True)
     """
     page = np.full((size, size), 255, np.uint8)
     scale = rng.uniform(0.0012, 0.004) * size
@@ -189,7 +199,7 @@ def _wave_numbers(rng: np.random.Generator, highest: float) -> tuple[int, int]:
     return along, int(rng.integers(-along, along + 1))
 
 
-def _grid(size: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def _grid(size: int) -> tuple[Floats, Floats]:
     """(y, x) as (size, 1) and (1, size) in [0, 1)."""
     axis = np.arange(size) / size
     return axis[:, None], axis[None, :]
@@ -200,7 +210,7 @@ def _soften(image: Texture) -> Texture:
     return np.asarray(scipy.ndimage.gaussian_filter(image, 0.6, mode="wrap").clip(0, 1).astype(np.float32, copy=False))
 
 
-def _stretch(image: NDArray[np.float64]) -> Texture:
+def _stretch(image: Floats) -> Texture:
     """To the full range [0, 1]."""
     low, high = image.min(), image.max()
     return np.asarray(((image - low) / max(high - low, 1e-12)).astype(np.float32))

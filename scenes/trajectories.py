@@ -15,12 +15,13 @@ from typing import Protocol, runtime_checkable
 
 import numpy as np
 import scipy
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from spikecam_env.errors import InputError
+from spikecam_env.types import Floats
 
 Vector = tuple[float, float, float]
-Pose = NDArray[np.float64]
+Pose = Floats
 
 GRAVITY = 9.81
 """[m/s^2]"""
@@ -28,10 +29,11 @@ GRAVITY = 9.81
 
 @runtime_checkable
 class Trajectory(Protocol):
-    """Anything with a pose over time; no state, so any time may be asked for in any order.
+    """Anything with a pose over time; no state, so times may come in any order.
 
-    >>> isinstance(Still(), Trajectory)
-    True
+    Example:
+        >>> isinstance(Still(), Trajectory)
+        True
     """
 
     def pose(self, time_s: ArrayLike) -> Pose:
@@ -40,11 +42,12 @@ class Trajectory(Protocol):
 
 
 class Motion:
-    """What makes trajectories chain: `outer @ inner`.
+    """Base of trajectories that chain: `outer @ inner`.
 
-    >>> moved = Still((0.0, 1.0, 0.0)) @ Still((2.0, 0.0, 0.0))
-    >>> moved.pose(0.0)[:3, 3].tolist()
-    [2.0, 1.0, 0.0]
+    Example:
+        >>> moved = Still((0.0, 1.0, 0.0)) @ Still((2.0, 0.0, 0.0))
+        >>> moved.pose(0.0)[:3, 3].tolist()
+        [2.0, 1.0, 0.0]
     """
 
     def pose(self, time_s: ArrayLike) -> Pose:
@@ -58,9 +61,10 @@ class Motion:
 class Chain(Motion):
     """outer after inner.
 
-    >>> turned = Still((0.0, 1.0, 0.0)) @ Spinning((0.0, 0.0, 1.0), rpm=60.0)
-    >>> type(turned).__name__, turned.pose(0.25)[:2, :2].round(6).tolist()
-    ('Chain', [[0.0, -1.0], [1.0, 0.0]])
+    Example:
+        >>> turned = Still((0.0, 1.0, 0.0)) @ Spinning((0.0, 0.0, 1.0), rpm=60.0)
+        >>> type(turned).__name__, turned.pose(0.25)[:2, :2].round(6).tolist()
+        ('Chain', [[0.0, -1.0], [1.0, 0.0]])
     """
 
     outer: Trajectory
@@ -76,8 +80,9 @@ class Still(Motion):
 
     Still((0, 1, 0), turn=(90, 0, 0)) lies a quarter turn about x at height 1.
 
-    >>> Still((0.0, 1.0, 0.0)).pose(0.0)[:3, 3].tolist()
-    [0.0, 1.0, 0.0]
+    Example:
+        >>> Still((0.0, 1.0, 0.0)).pose(0.0)[:3, 3].tolist()
+        [0.0, 1.0, 0.0]
     """
 
     position: Vector = (0.0, 0.0, 0.0)
@@ -87,7 +92,7 @@ class Still(Motion):
         return _pose(np.shape(time_s), self._rotation, self.position)
 
     @cached_property
-    def _rotation(self) -> NDArray[np.float64]:
+    def _rotation(self) -> Floats:
         return _turns(np.radians(self.turn))
 
 
@@ -95,8 +100,9 @@ class Still(Motion):
 class Ballistic(Motion):
     """position + velocity t + gravity t^2 / 2: thrown at t = 0; without gravity, straight and even.
 
-    >>> Ballistic(velocity=(3.0, 2.0, 0.0), gravity=(0.0, -9.81, 0.0)).pose(0.1)[:3, 3].round(3).tolist()
-    [0.3, 0.151, 0.0]
+    Example:
+        >>> Ballistic(velocity=(3.0, 2.0, 0.0), gravity=(0.0, -9.81, 0.0)).pose(0.1)[:3, 3].round(3).tolist()
+        [0.3, 0.151, 0.0]
     """
 
     position: Vector = (0.0, 0.0, 0.0)
@@ -113,8 +119,9 @@ class Ballistic(Motion):
 class Spinning(Motion):
     """Turning evenly about an axis through the origin: angle = angle_deg + 6 rpm t [degrees].
 
-    >>> Spinning((0.0, 0.0, 1.0), rpm=60.0).pose(0.25)[:2, :2].round(6).tolist()
-    [[0.0, -1.0], [1.0, 0.0]]
+    Example:
+        >>> Spinning((0.0, 0.0, 1.0), rpm=60.0).pose(0.25)[:2, :2].round(6).tolist()
+        [[0.0, -1.0], [1.0, 0.0]]
     """
 
     axis: Vector
@@ -130,9 +137,10 @@ class Spinning(Motion):
 class Swinging(Motion):
     """Turning to and fro about an axis through the origin: angle = amplitude sin(2 pi (frequency t + phase)).
 
-    >>> pose = Swinging((0.0, 0.0, 1.0), amplitude_deg=30.0, frequency_hz=1.0).pose(0.25)
-    >>> round(float(np.degrees(np.arctan2(pose[1, 0], pose[0, 0]))), 3)
-    30.0
+    Example:
+        >>> pose = Swinging((0.0, 0.0, 1.0), amplitude_deg=30.0, frequency_hz=1.0).pose(0.25)
+        >>> round(float(np.degrees(np.arctan2(pose[1, 0], pose[0, 0]))), 3)
+        30.0
     """
 
     axis: Vector
@@ -149,8 +157,9 @@ class Swinging(Motion):
 class Vibrating(Motion):
     """Moving to and fro: amplitude (a vector) times sin(2 pi (frequency t + phase)).
 
-    >>> Vibrating((0.1, 0.0, 0.0), frequency_hz=100.0).pose(0.0025)[:3, 3].round(3).tolist()
-    [0.1, 0.0, 0.0]
+    Example:
+        >>> Vibrating((0.1, 0.0, 0.0), frequency_hz=100.0).pose(0.0025)[:3, 3].round(3).tolist()
+        [0.1, 0.0, 0.0]
     """
 
     amplitude: Vector
@@ -169,8 +178,9 @@ class Bouncing(Motion):
 
     y = height - g tau^2 / 2,  tau: time to the nearest top;  period 2 sqrt(2 height / g)
 
-    >>> Bouncing(height=1.0).pose([0.0, 0.1])[:, 1, 3].round(3).tolist()
-    [1.0, 0.951]
+    Example:
+        >>> Bouncing(height=1.0).pose([0.0, 0.1])[:, 1, 3].round(3).tolist()
+        [1.0, 0.951]
     """
 
     height: float
@@ -192,8 +202,10 @@ class Path(Motion):
 
     A closed path must end where it starts.  Before the first and after the last time an open path stands still.
 
-    >>> Path((0.0, 1.0, 2.0), ((0.0, 0.0, 0.0), (1.0, 0.0, 0.0), (2.0, 0.0, 0.0))).pose(0.5)[:3, 3].round(3).tolist()
-    [0.5, 0.0, 0.0]
+    Example:
+        >>> path = Path((0.0, 1.0, 2.0), ((0.0, 0.0, 0.0), (1.0, 0.0, 0.0), (2.0, 0.0, 0.0)))
+        >>> path.pose(0.5)[:3, 3].round(3).tolist()
+        [0.5, 0.0, 0.0]
     """
 
     time_s: tuple[float, ...]
@@ -227,15 +239,15 @@ class Path(Motion):
 class Shake(Motion):
     """A hand-held camera: small turns and shifts, each a sum of sines at random frequencies up to a highest one.
 
-    angle_deg, shift   standard deviation about and along each axis [degrees, world units]
-
-    >>> poses = Shake(angle_deg=0.05).pose([0.0, 0.01])
-    >>> poses.shape, bool((poses[0] == poses[1]).all())
-    ((2, 4, 4), False)
+    Example:
+        >>> poses = Shake(angle_deg=0.05).pose([0.0, 0.01])
+        >>> poses.shape, bool((poses[0] == poses[1]).all())
+        ((2, 4, 4), False)
     """
 
     angle_deg: float = 0.05
     shift: float = 0.0
+    """Standard deviation about and along each axis [degrees, world units]."""
     highest_hz: float = 60.0
     seed: int = 0
 
@@ -252,9 +264,10 @@ class Shake(Motion):
 class Repeating(Motion):
     """Another trajectory, started over after every period; the jump back is best made out of sight.
 
-    >>> thrown = Repeating(Ballistic(velocity=(1.0, 0.0, 0.0)), period_s=0.5)
-    >>> thrown.pose([0.1, 0.6])[:, 0, 3].round(3).tolist()
-    [0.1, 0.1]
+    Example:
+        >>> thrown = Repeating(Ballistic(velocity=(1.0, 0.0, 0.0)), period_s=0.5)
+        >>> thrown.pose([0.1, 0.6])[:, 0, 3].round(3).tolist()
+        [0.1, 0.1]
     """
 
     motion: Trajectory
@@ -271,12 +284,12 @@ AT_REST = Still()
 _SINES = 5
 
 
-def _turns(rotation_vectors: NDArray[np.float64]) -> NDArray[np.float64]:
+def _turns(rotation_vectors: Floats) -> Floats:
     """Matrices (..., 3, 3) of rotation vectors (..., 3) [radians]."""
     return np.asarray(scipy.spatial.transform.Rotation.from_rotvec(rotation_vectors).as_matrix())
 
 
-def _turned(axis: Vector, angle: NDArray[np.float64]) -> Pose:
+def _turned(axis: Vector, angle: Floats) -> Pose:
     """Rotation by angles (...) [radians] about an axis (Rodrigues' formula)."""
     cross, twice = _crosses(tuple(axis))
     sine, versine = np.sin(angle)[..., None, None], (1 - np.cos(angle))[..., None, None]
@@ -287,7 +300,7 @@ _UNTURNED, _AT_ORIGIN = np.eye(3), np.zeros(3)
 
 
 @lru_cache(maxsize=256)
-def _crosses(axis: Vector) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def _crosses(axis: Vector) -> tuple[Floats, Floats]:
     """The matrix of the cross product with an axis of length 1, and its square; a scene asks for them in every step."""
     length = float(np.linalg.norm(axis))
     if not length > 0:
@@ -297,7 +310,7 @@ def _crosses(axis: Vector) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     return cross, cross @ cross
 
 
-def _pose(shape: tuple[int, ...], rotation: NDArray[np.float64], position: ArrayLike) -> Pose:
+def _pose(shape: tuple[int, ...], rotation: Floats, position: ArrayLike) -> Pose:
     pose = np.zeros((*shape, 4, 4))
     pose[..., :3, :3], pose[..., :3, 3], pose[..., 3, 3] = rotation, position, 1.0
     return pose

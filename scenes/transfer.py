@@ -37,8 +37,9 @@ CIE XYZ; ITU-R BT.709, BT.470, SMPTE 170M, SMPTE EG 432-1 (P3, D65), ITU-R BT.20
 def linear_from_srgb(encoded: ArrayLike) -> Pictures:
     """sRGB values in [0, 1] to linear light (IEC 61966-2-1).
 
-    >>> [round(float(light), 3) for light in linear([0.0, 0.5, 1.0])]
-    [0.0, 0.214, 1.0]
+    Example:
+        >>> [round(float(light), 3) for light in linear([0.0, 0.5, 1.0])]
+        [0.0, 0.214, 1.0]
     """
     code = np.asarray(encoded, np.float32)
     return np.where(code <= 0.04045, code / 12.92, ((code + 0.055) / 1.055) ** 2.4).astype(np.float32)
@@ -72,7 +73,11 @@ TRANSFERS: dict[str, Callable[[Pictures], Pictures]] = {
 
 
 def curve(transfer: str) -> Callable[[Pictures], Pictures]:
-    """The function of a transfer, float32 in [0, 1] to linear light.  Errors: InputError for an unknown name."""
+    """The function of a transfer, float32 in [0, 1] to linear light.
+
+    Raises:
+        InputError: the name is unknown.
+    """
     if transfer in TRANSFERS:
         return TRANSFERS[transfer]
     power = re.fullmatch(r"gamma(\d+(?:\.\d+)?)", transfer)
@@ -85,8 +90,9 @@ def curve(transfer: str) -> Callable[[Pictures], Pictures]:
 def light_of(values: Pictures, transfer: str, where: str) -> Pictures:
     """Linear light of stored values; those of `linear` may lie above 1.
 
-    Errors: InputError, which begins with `where`, for values that are negative, not finite, or above 1 where the
-    transfer has no light for them.
+    Raises:
+        InputError: values are negative, not finite, or above 1 where the transfer has no light for them.  The message
+            begins with `where`.
     """
     low, high = values.min(), values.max()
     most = np.inf if transfer == "linear" else 1.0
@@ -101,7 +107,8 @@ def light_of(values: Pictures, transfer: str, where: str) -> Pictures:
 def grey(light: Pictures, channel: str = "luminance", primaries: str = "bt709") -> Pictures:
     """(h, w) of linear light (h, w) or (h, w, 3: red, green, blue): luminance, or one channel.
 
-    Errors: InputError for an unknown channel, and for a channel of a picture without colour.
+    Raises:
+        InputError: the channel is unknown, or the picture has no colour.
     """
     if channel not in CHANNELS:
         raise unknown_name("channel", channel, CHANNELS)

@@ -1,4 +1,4 @@
-"""A film of yours as a scene: light that was really there, without a truth about motion."""
+"""A film as a scene: real light, without a truth about motion."""
 
 from __future__ import annotations
 
@@ -13,11 +13,12 @@ from numpy.typing import ArrayLike, NDArray
 
 from scenes.exposure import checked_interval
 from scenes.film import Film, FilmOptions, fitted, given_times, read_array, read_film
-from scenes.keys import LONGEST_INTERVAL, interval_for, paint_keys
+from scenes.keys import LONGEST_INTERVAL, check_frames, interval_for, paint_keys
 from scenes.protocol import Gaze, Truth
 from scenes.transfer import CHANNELS, curve, grey, light_of
 from spikecam_env.errors import InputError, unknown_name
 from spikecam_env.sensor import Keyframes
+from spikecam_env.types import Pictures
 
 INTERPOLATIONS = ("linear", "hold")
 SHORTEST, LONGEST = 0.01, 1e12
@@ -27,36 +28,40 @@ SHORTEST, LONGEST = 0.01, 1e12
 class VideoScene:
     """Scene: a film, played forth and back without end.
 
-    film           path of a video file, of a folder of pictures, or of a CSV file of name,time_s; or an array, or its
-                   .npy file, (T, h, w) or (T, h, w, 3: red, green, blue): whole numbers of full scale (uint8, uint16),
-                   or floats
-    film_rate_hz   pictures a second when it was taken (a slow-motion film plays slower than that); default: the file's
-                   time stamps.  An array or a folder needs it, or times_s.
-    shape          (rows, columns) of the sensor, filled by the middle of the film, averaged over area; default: its own
-    light          radiance of black and of full scale: (dark, bright); linear light above 1 goes beyond bright
-    gamma          linear light = (value / full scale) ^ gamma; the same as transfer=f"gamma{gamma}", and 1 as "linear"
-    most_pictures  leave out what comes later
-    frame_rate_hz  of the sensor
-    transfer       from values to linear light, as `scenes.transfer` names it: "srgb", "bt709", "gamma2.2", "linear",
-                   "pq", "hlg"; default: what the file states, "gamma2.2" for arrays
-    channel        "luminance", "red", "green" or "blue"
-    interpolation  of light in time between two pictures: "linear", or "hold": the former until the next, within a frame
-    times_s        (T,) the time of every picture [s]
-    slow           the file plays so many times slower than life: its time stamps are divided by it
-    seconds        of the film's true time to be read; default: all
-    mean_interval  scale the light so that pixels fire every so many frames on average over the film, or over the
-                   seconds of it that were asked; default: not
-
     Truth: radiance alone.  Flow is NaN, for a film does not tell it; all is object 0.  A gaze beyond the edge sees the
     film mirrored.
     Warns where a file holds fewer pictures, or lasts shorter, than it states, and where a video states no transfer.
-    Errors: InputError for a film that cannot be read or has fewer than two pictures, time stamps that do not rise, a
-    transfer that is not read, or not stated with more than 8 bits a value, and a value out of range.
 
-    >>> film = np.stack([np.full((8, 12), value, np.uint8) for value in (0, 255)])
-    >>> scene = VideoScene(film, film_rate_hz=1000.0, light=(0.0, 0.6), transfer="linear")
-    >>> [round(float(scene.radiance(0, 40).at(frame)[0, 0]), 2) for frame in (0, 20, 40)]
-    [0.0, 0.3, 0.6]
+    Args:
+        film: path of a video file, of a folder of pictures, or of a CSV file of name,time_s; or an array, or its .npy
+            file, (T, h, w) or (T, h, w, 3: red, green, blue): whole numbers of full scale (uint8, uint16), or floats.
+        film_rate_hz: pictures a second when it was taken (a slow-motion film plays slower than that); default: the
+            file's time stamps.  An array or a folder needs it, or times_s.
+        shape: (rows, columns) of the sensor, filled by the middle of the film, averaged over area; default: its own.
+        light: radiance of black and of full scale: (dark, bright); linear light above 1 goes beyond bright.
+        gamma: linear light = (value / full scale) ^ gamma; the same as transfer=f"gamma{gamma}", and 1 as "linear".
+        most_pictures: that are read, from the first.
+        frame_rate_hz: of the sensor.
+        transfer: from values to linear light, as `scenes.transfer` names it: "srgb", "bt709", "gamma2.2", "linear",
+            "pq", "hlg"; default: that of the file, "gamma2.2" for arrays.
+        channel: "luminance", "red", "green" or "blue".
+        interpolation: of light in time between two pictures: "linear", or "hold": the former until the next, within a
+            frame.
+        times_s: (T,) the time of every picture [s].
+        slow: the file plays so many times slower than life: its time stamps are divided by it.
+        seconds: of the film's true time to be read; default: all.
+        mean_interval: scale the light so that pixels fire every so many frames on average over the film, or over the
+            `seconds` of it; default: not.
+
+    Raises:
+        InputError: the film cannot be read or has fewer than two pictures, or its time stamps do not rise.  The
+            transfer is not read, or not stated with more than 8 bits a value.  A value is out of range.
+
+    Example:
+        >>> film = np.stack([np.full((8, 12), value, np.uint8) for value in (0, 255)])
+        >>> scene = VideoScene(film, film_rate_hz=1000.0, light=(0.0, 0.6), transfer="linear")
+        >>> [round(float(scene.radiance(0, 40).at(frame)[0, 0]), 2) for frame in (0, 20, 40)]
+        [0.0, 0.3, 0.6]
     """
 
     def __init__(
@@ -146,8 +151,7 @@ class VideoScene:
 
     def radiance(self, start: int, stop: int, gaze: Gaze | None = None) -> Keyframes:
         """Keys that cover frames [start, stop], at most 64 apart: the whole frames next to every picture's time."""
-        if not start < stop:
-            raise InputError(f"frames {start} to {stop} asked; the first must be before the second")
+        check_frames(start, stop)
         frame = self._key_frames(start, stop)
         if gaze is not None:
             interval = interval_for(float(np.hypot(*gaze.rate)), 0.6)
@@ -163,7 +167,7 @@ class VideoScene:
         camera = gaze.at(frame) if gaze else (0.0, 0.0)
         return Truth(radiance, flow, np.zeros(self.shape, np.int32), poses={"camera": camera})
 
-    def _paint(self, frame: float, gaze: Gaze | None, picture: NDArray[np.float32]) -> None:
+    def _paint(self, frame: float, gaze: Gaze | None, picture: Pictures) -> None:
         place = self._place(frame)
         if self._hold:
             seen = self._picture(min(int(place), self.pictures - 1))
@@ -179,7 +183,7 @@ class VideoScene:
             seen = np.asarray(turned, np.float32)
         np.multiply(seen, self._gain, out=picture)
 
-    def _picture(self, number: int) -> NDArray[np.float32]:
+    def _picture(self, number: int) -> Pictures:
         """A picture's light; films are kept in half precision, in which nothing is to be computed."""
         return np.asarray(self._light[number].astype(np.float32, copy=False))
 
@@ -218,7 +222,8 @@ class VideoScene:
     def _mean(self, until: float) -> float:
         """Radiance over the picture and the film's frames 0 to `until`, by the time that each picture has.
 
-        Errors: InputError for a film without light.
+        Raises:
+            InputError: the film has no light.
         """
         means = np.array([picture.mean(dtype=np.float64) for picture in self._light])
         spans = np.diff(self._knots)
@@ -268,7 +273,7 @@ def _film(film: str | PathLike[str] | NDArray[np.generic], how: FilmOptions) -> 
 
 
 def _transfer(transfer: str | None, gamma: float | None) -> str | None:
-    """The name of one; errors: InputError for an unknown one, and where both are given."""
+    """The name of the transfer, known, from one of the two options at most."""
     if gamma is not None:
         if transfer is not None:
             raise InputError(f"transfer is {transfer!r} and gamma {gamma}; give one of the two")

@@ -1,4 +1,4 @@
-"""Wavefront OBJ and MTL: made plain for trimesh, and the names of what no surface shows.
+"""Wavefront OBJ and MTL: made plain for trimesh, and the names of parts that no surface shows.
 
     (u, v) of the picture = offset + scale x (u, v)         map_Kd -o u v w -s u v w FILE
 
@@ -27,13 +27,13 @@ NUMBERS = ("-o", "-s", "-t", "-mm")
 HARMLESS = ("-blendu", "-blendv", "-boost", "-cc", "-texres")
 """Options that do not change the light of a picture that is averaged over pixels."""
 UNREAD_STATEMENTS = {"l": LINES, "p": LINES} | dict.fromkeys(("curv", "curv2", "surf"), "curves and surfaces")
-"""Names of what OBJ's statements give, and no surface shows."""
+"""Parts that OBJ's statements give, and no surface shows."""
 COUNTS_BACK = re.compile(r"\n *f [ \d/]*-")
 IS_COLOURED = re.compile(r"\n *v(?: +[^ \n]+){6}")
 
 
 def plain_obj(data: bytes) -> tuple[bytes, list[str]]:
-    """An OBJ file whose indices count from the start, and the names of what it has and no surface shows.
+    """An OBJ file whose indices count from the start, and the names of its parts that no surface shows.
 
     Raises:
         InputError: colours of vertices are out of 0 to 1, or an index counts back beyond the first line.
@@ -68,7 +68,7 @@ def plain_mtl(data: bytes) -> tuple[bytes, set[str]]:
 
 
 def unread_of(material: dict[str, Any]) -> Iterator[str]:
-    """Names of what a material of MTL states, and no surface shows; keys as trimesh has them."""
+    """Names of the parts of a material of MTL that no surface shows; keys as trimesh has them."""
 
     def most(key: str) -> float:
         values = material.get(key, 0.0)
@@ -89,7 +89,7 @@ def unread_of(material: dict[str, Any]) -> Iterator[str]:
 
 
 def _of_vertices(text: str) -> list[str]:
-    """Names of what is left out where vertices have colours: `v x y z red green blue`."""
+    """Names of the parts that are left out where vertices have colours: `v x y z red green blue`."""
     rows = [line.split() for line in re.findall(r"^ *v (.*)$", text, re.M)]
     coloured = [row[3:6] for row in rows if len(row) >= 6]
     values = np.array(coloured, np.float64)
@@ -122,7 +122,7 @@ def _corner(corner: str, counts: tuple[int, ...]) -> str:
 
 
 def _picture_lines(rest: str) -> list[str]:
-    """`map_Kd` with the file alone, and where it lies, of what follows the key."""
+    """`map_Kd` with the file alone, and its place, from the text after the key."""
     offset, scale, clamped, others = [0.0, 0.0], [1.0, 1.0], False, []
     while (option := rest.split(None, 1)[0]) in OPTIONS:
         values, rest = _values(option, rest.split(None, 1)[1])
@@ -138,7 +138,7 @@ def _picture_lines(rest: str) -> list[str]:
 
 
 def _values(option: str, rest: str) -> tuple[list[str], str]:
-    """The values of an option, and what follows them."""
+    """The values of an option, and the words after them."""
     values: list[str] = []
     belongs: Callable[[str], bool] = _is_number if option in NUMBERS else bool
     while len(values) < OPTIONS[option] and len(parts := rest.split(None, 1)) == 2 and belongs(parts[0]):

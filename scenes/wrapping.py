@@ -8,10 +8,11 @@ from numpy.typing import NDArray
 from scenes.pictures import check_size
 from scenes.textures import Texture
 from spikecam_env.errors import InputError
+from spikecam_env.types import Floats
 
-Points = NDArray[np.float64]
+Points = Floats
 REPEAT, MIRROR, CLAMP, KEEP = "repeat", "mirror", "clamp", "keep"
-"""What is seen beyond a side of a picture; KEEP leaves that axis as it is, to a renderer that repeats."""
+"""The view beyond a side of a picture; KEEP leaves that axis as it is, to a renderer that repeats."""
 FARTHEST = 1e6
 """Coordinate, in pictures, at which single precision, in which files and OpenGL hold it, is off by 0.06 pictures."""
 NEAR = 1e-6

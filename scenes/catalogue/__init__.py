@@ -73,13 +73,17 @@ def make_scene(
 ) -> Scene:
     """A scene of the catalogue, exposed to a mean interval [frames].
 
-    seed       of what the scene leaves to chance: textures, starting poses
-    renderer   default: chosen on first use, in each process (`scenes.renderers`)
-    Errors: InputError for an unknown name, with those that there are.
+    Args:
+        seed: of textures and starting poses.
+        renderer: default: chosen on first use, in each process.
 
-    >>> light = make_scene("collage", shape=(16, 24)).radiance(0, 64)
-    >>> light.radiance.shape[1:]
-    (16, 24)
+    Raises:
+        InputError: the name is unknown, or a value is out of range.
+
+    Example:
+        >>> light = make_scene("collage", shape=(16, 24)).radiance(0, 64)
+        >>> light.radiance.shape[1:]
+        (16, 24)
     """
     return exposed(unexposed_scene(name, shape, seed, frame_rate_hz, renderer), mean_interval)
 
@@ -89,8 +93,9 @@ def unexposed_scene(
 ) -> Scene:
     """A scene of the catalogue in light of its own; nothing is rendered yet.  Arguments and errors: `make_scene`.
 
-    >>> unexposed_scene("disk", (16, 24), 0, 40_000.0).shape
-    (16, 24)
+    Example:
+        >>> unexposed_scene("disk", (16, 24), 0, 40_000.0).shape
+        (16, 24)
     """
     if name not in SCENES:
         raise unknown_name("scene", name, SCENES)
@@ -102,9 +107,10 @@ def unexposed_scene(
 def exposed(scene: Scene, mean_interval: float) -> Scene:
     """`scenes.exposure.expose`, worlds measured small.
 
-    >>> scene = exposed(unexposed_scene("disk", (16, 24), 0, 40_000.0), mean_interval=20.0)
-    >>> round(1.0 / float(scene.truth(0.5).radiance.mean()))
-    20
+    Example:
+        >>> scene = exposed(unexposed_scene("disk", (16, 24), 0, 40_000.0), mean_interval=20.0)
+        >>> round(1.0 / float(scene.truth(0.5).radiance.mean()))
+        20
     """
     metered, shape = None, scene.shape
     if isinstance(scene, World) and shape[0] > METERED_ROWS:
@@ -121,8 +127,9 @@ def random_world(
 ) -> Scene:
     """Textured objects in random rigid motion before a background, as in SPIFT; the whole follows from the seed.
 
-    >>> scene = random_world(seed=3, shape=(16, 24))
-    >>> scene.truth(0.5).depth.shape
-    (16, 24)
+    Example:
+        >>> scene = random_world(seed=3, shape=(16, 24))
+        >>> scene.truth(0.5).depth.shape
+        (16, 24)
     """
     return make_scene("random", shape, seed, mean_interval, frame_rate_hz, renderer)

@@ -1,4 +1,4 @@
-"""What the catalogue's scenes stand on: a camera that sees 2 units of height, floors and walls."""
+"""The stage of the catalogue's scenes: a camera that sees 2 units of height, floors and walls."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ GRAVITY_CM = (0.0, -981.0, 0.0)
 """[cm/s^2] A unit is a centimetre."""
 
 UNITS_SEEN = 2.0
-"""Height of what the camera sees at the origin; 3.2 across at 250 x 400."""
+"""Height of the view at the origin; 3.2 across at 250 x 400."""
 
 
 def camera(above: float = 0.8, distance: float = 6.0, shake: Trajectory = AT_REST) -> Camera:

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from scenes.gltf.container import File, Tree
 from spikecam_env.errors import InputError, shown
+from spikecam_env.types import Floats
 
 COMPONENTS = {5120: "i1", 5121: "u1", 5122: "<i2", 5123: "<u2", 5125: "<u4", 5126: "<f4"}
 COLUMNS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4, "MAT4": 16}
@@ -20,7 +21,7 @@ MOST_ITEMS = 1 << 27
 """Numbers of the largest table that is read, 1 GB: a few bytes can state any number of rows."""
 
 
-def numbers(file: File, index: Any) -> NDArray[np.float64]:
+def numbers(file: File, index: Any) -> Floats:
     """An accessor as it is meant, (rows, columns) float64; whole numbers that are normalized become shares of 1.
 
     Raises:

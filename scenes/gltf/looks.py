@@ -27,7 +27,7 @@ from spikecam_env.errors import InputError
 from spikecam_env.types import Pictures
 
 WRAPS = {10497: KEEP, 33071: CLAMP, 33648: MIRROR}
-"""Of a sampler, by OpenGL's numbers; renderers repeat what is kept."""
+"""Of a sampler, by OpenGL's numbers; renderers repeat along an axis that is KEEP."""
 NEAREST = 9728
 GLOSS = "KHR_materials_pbrSpecularGlossiness"
 TRANSFORM, STRENGTH = "KHR_texture_transform", "KHR_materials_emissive_strength"
@@ -137,7 +137,7 @@ class Looks:
         return None if self._opened(number) is None else int(number)
 
     def _opened(self, number: int) -> tuple[Pictures, Pictures] | None:
-        """Colours (h, w, 3) and alpha (h, w) of an image; None, with a note, where it is not there or damaged."""
+        """Colours (h, w, 3) and alpha (h, w) of an image; None, with a note, where it is missing or damaged."""
         if number not in self._pixels:
             self._pixels[number] = None
             if (data := self._bytes(number)) is not None:

@@ -11,14 +11,14 @@ from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from trimesh.transformations import quaternion_matrix
 
 from scenes.gltf.accessors import numbers
 from scenes.gltf.container import File, Tree
 from spikecam_env.errors import InputError
+from spikecam_env.types import Floats
 
-Matrix = NDArray[np.float64]
+Matrix = Floats
 INSTANCING = "EXT_mesh_gpu_instancing"
 VISIBILITY = "KHR_node_visibility"
 

@@ -37,7 +37,7 @@ def read_gltf(data: bytes, beside: Callable[[str], bytes], own: bool = True) -> 
         own: whether the file's own albedo is wanted; else pieces have one value, and coordinates for another texture.
 
     Returns:
-        The pieces, and the names of what the file has and they do not show.
+        The pieces, and the names of the parts of the file that they do not show.
 
     Raises:
         InputError: the file is no glTF 2, is damaged, or needs an extension that is not read.  A damaged file may

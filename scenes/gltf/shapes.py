@@ -22,8 +22,9 @@ from scenes.gltf.container import File, Tree
 from scenes.gltf.nodes import Matrix, instances
 from scenes.unshown import LINES
 from spikecam_env.errors import InputError
+from spikecam_env.types import Floats, Masks
 
-Table = NDArray[np.float64]
+Table = Floats
 TRIANGLES, STRIP, FAN = 4, 5, 6
 MOST_CORNERS = 1 << 26
 """Of the triangles of a file, its instances counted: each takes some 100 bytes."""
@@ -154,7 +155,7 @@ def _moved(whole: Shape, matrix: Matrix) -> Shape:
     return replace(whole, faces=faces, tables=tables)
 
 
-def _turned(normals: Table, linear: Matrix, mirrored: NDArray[np.bool_]) -> Table:
+def _turned(normals: Table, linear: Matrix, mirrored: Masks) -> Table:
     """Normals (V, 3) on a surface that goes through (3, 3) or (V, 3, 3): by its inverse, transposed."""
     if not np.isfinite(normals).all():
         raise InputError("normals of the mesh hold NaN or infinity; they must be finite")

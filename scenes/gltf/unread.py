@@ -23,14 +23,14 @@ LOOKS_ALONE = ("KHR_materials_", "KHR_lights_", "EXT_lights_", "KHR_xmp", "KHR_a
 
 
 def check_required(tree: Tree) -> None:
-    """Raises InputError for an extension that the file needs, and that is not read."""
+    """Refuse a file that needs an extension that is not read."""
     for name in tree.get("extensionsRequired", []):
         if name not in READ and not str(name).startswith(LOOKS_ALONE):
             raise InputError(f"the file needs {name}, which is not read; export it without")
 
 
 def note_unread(file: File) -> None:
-    """Note what the whole file has that no surface shows: its animations, cameras, maps, other extensions."""
+    """Note the parts of a file that no surface shows: animations, cameras, maps, other extensions."""
     for name in ("animations", "cameras"):
         if file.tree.get(name):
             file.without(name)

@@ -3,8 +3,8 @@
     egl-hardware, egl-software, osmesa, embree
 
 OpenGL drivers can crash or hang where they do not serve, so each is tried in a process of its own, which draws one
-triangle.  `SPIKECAM_RENDERER` or the argument `wanted` names one instead; then nothing is tried beforehand, which is
-what the workers of a long job want once their parent has chosen.
+triangle.  `SPIKECAM_RENDERER` or the argument `wanted` names one instead; then nothing is tried beforehand.
+Workers of a long job get their parent's choice so.
 """
 
 from __future__ import annotations
@@ -19,8 +19,8 @@ from importlib.util import find_spec
 
 from scenes.renderers import contexts
 from scenes.renderers.contexts import FIX
-from scenes.renderers.elsewhere import Elsewhere
 from scenes.renderers.opengl import OpenGL
+from scenes.renderers.own_process import ProcessRenderer
 from scenes.renderers.protocol import Renderer
 from spikecam_env.errors import InputError, NotReadyError, unknown_name
 
@@ -40,8 +40,11 @@ logger = logging.getLogger(__name__)
 def choose_renderer(wanted: str | None = None) -> Renderer:
     """A renderer, and one line in the log (INFO) that names it; a WARNING where there is no OpenGL at all.
 
-    wanted: one of `BACKENDS`, or "auto" for the first that works; default: SPIKECAM_RENDERER, else "auto".
-    Errors: InputError for an unknown name, or with the fix where the wanted back-end, or none at all, serves here.
+    Args:
+        wanted: one of `BACKENDS`, or "auto" for the first that works; default: SPIKECAM_RENDERER, else "auto".
+
+    Raises:
+        InputError: the name is unknown, or the back-end, or any, does not work here; the message has the remedy.
     """
     name = chosen(wanted)
     renderer = make(name)
@@ -55,16 +58,13 @@ def choose_renderer(wanted: str | None = None) -> Renderer:
 
 
 def chosen(wanted: str | None = None) -> str:
-    """The name of what `choose_renderer` would make; nothing is begun in this process.  Errors: InputError as there."""
+    """The name of the renderer that `choose_renderer` would make, without starting it."""
     name = wanted or os.environ.get(VARIABLE) or "auto"
     return _first_that_works() if name == "auto" else name
 
 
 def make(name: str) -> Renderer:
-    """The back-end of this name: in this process, or beside it where OpenGL cannot begin in it (`contexts.may_begin`).
-
-    Errors: as `choose_renderer`.
-    """
+    """The back-end of this name: in this process, or in its own where OpenGL cannot start here."""
     if name not in BACKENDS:
         raise unknown_name("renderer", name, (*BACKENDS, "auto"))
     try:
@@ -72,8 +72,8 @@ def make(name: str) -> Renderer:
             from scenes.renderers.embree import Embree
 
             return Embree()
-        if not contexts.may_begin():
-            return Elsewhere(name)
+        if not contexts.can_start():
+            return ProcessRenderer(name)
         return OpenGL(name)
     except NotReadyError:
         raise
@@ -110,7 +110,7 @@ def problem(name: str) -> str | None:
 
 
 def _first_that_works() -> str:
-    """Errors: InputError with every reason where none does."""
+    """Name of the best back-end that works; the error for none has every reason."""
     reasons = {}
     for name in BACKENDS:
         reason = problem(name)

@@ -25,10 +25,10 @@ FIX = {
     "osmesa": "install the system package libosmesa6 (Debian, Ubuntu: apt-get install -y libosmesa6)",
     "embree": "pip install embreex (x86-64, or macOS)",
 }
-"""What to do where a back-end cannot be had."""
+"""Remedies for a back-end that does not work."""
 
 _LIBRARIES = ("libEGL.so.1", "libOSMesa.so.8", "libOSMesa.so.6")
-_begun_in: int | None = None
+_started_in: int | None = None
 
 EGL_EXTENSIONS = 0x3055
 SOFTWARE = b"EGL_MESA_device_software"
@@ -42,20 +42,21 @@ class Context:
     end: Callable[[], None]
 
 
-def may_begin() -> bool:
-    """Whether OpenGL can begin in this process, or has: not where a process has begun it and then forked this one.
+def can_start() -> bool:
+    """Whether OpenGL can start in this process, or has: not in a fork of a process that has used it.
 
-    Its displays and threads are copied half, and the first call hangs.
+    There displays and threads are copied half, and the first call hangs.
     """
-    if _begun_in is not None:
-        return _begun_in == os.getpid()
+    if _started_in is not None:
+        return _started_in == os.getpid()
     return not (may_be_forked() and any(map(_is_loaded, _LIBRARIES)))
 
 
 def egl(software: bool) -> Context:
     """A context on the first graphics card, or on the processor, that serves OpenGL 4.1.
 
-    Errors: whatever the libraries raise; RuntimeError where no device of this kind serves.
+    Raises:
+        RuntimeError: no device of this kind serves; errors of the libraries pass through.
     """
     _load("libEGL.so.1", "libEGL.so")
     import_pyrender("egl")
@@ -82,7 +83,9 @@ def osmesa() -> Context:
     """A context in Mesa's off-screen library: OpenGL 3.3 on the processor.
 
     The library is called directly: PyOpenGL 3.1.0, which pyrender asks for, lacks OSMesaCreateContextAttribs.
-    Errors: RuntimeError where the library is missing or refuses.
+
+    Raises:
+        RuntimeError: the library is missing, or makes no context.
     """
     library = _load("libOSMesa.so.8", "libOSMesa.so.6", "libOSMesa.so")
     import_pyrender("osmesa")
@@ -119,8 +122,8 @@ def _is_loaded(library: str) -> bool:
 
 
 def _load(*names: str) -> ctypes.CDLL:
-    global _begun_in
-    _begun_in = os.getpid()
+    global _started_in
+    _started_in = os.getpid()
     for name in names:
         try:
             return ctypes.CDLL(name, mode=ctypes.RTLD_GLOBAL)

@@ -1,7 +1,7 @@
 """Ray casting on the processor: needs no OpenGL, only pip.
 
 Embree finds the first triangle that a ray meets.  With the triangle's corners as columns of M, in camera
-coordinates, and the ray d = ((x - centre_x) / focal, -(y - centre_y) / focal, -1), all that shading needs follows from
+coordinates, and the ray d = ((x - centre_x) / focal, -(y - centre_y) / focal, -1), shading follows from
 
     c = M^-1 d,  depth = 1 / sum(c),  barycentric b = c / sum(c),  db/dx = (dc/dx - b sum(dc/dx)) / sum(c)
 
@@ -23,6 +23,7 @@ from scenes.renderers.protocol import Lighting, PictureWindow, Pinhole, Sprite, 
 from scenes.renderers.pyramid import SHARPER
 from scenes.renderers.view import SurfaceArrays, blank, checked, geometry, moved, pasted, reached, to_camera, towards
 from spikecam_env.compiled import njit
+from spikecam_env.types import Floats, Pictures
 
 RAYS_AT_ONCE = 1 << 18
 """Bounds the memory: about 10 MB, whatever the supersampling."""
@@ -39,7 +40,7 @@ class Embree:
     def render(
         self,
         surface: Surface,
-        pose: NDArray[np.float64],
+        pose: Floats,
         camera: Pinhole,
         lighting: Lighting,
         window: PictureWindow,
@@ -96,12 +97,9 @@ class _Traceable:
         TriangleMesh(self._scene, unit, geometry.faces)
 
     def hit(
-        self, matrix: NDArray[np.float64], place: tuple[float, float, float], size: tuple[int, int], supersample: int
+        self, matrix: Floats, place: tuple[float, float, float], size: tuple[int, int], supersample: int
     ) -> NDArray[np.int32]:
-        """(rows, columns, rays) the first triangle each ray meets, -1 where there is none.
-
-        place: (x, y) of the first pixel from the camera's axis, and the tangent of one pixel.
-        """
+        """(rows, columns, rays) the first triangle that each ray meets, -1 for none; `place` as in `_shade`."""
         turn = np.asarray(np.linalg.inv(matrix[:3, :3]), np.float64)
         eye = (-turn @ matrix[:3, 3] - self._middle) / self._size
         origins, directions = _rays(eye, turn, *place, *size, supersample)
@@ -109,7 +107,7 @@ class _Traceable:
 
 
 @njit(cache=True)
-def _inverses(corners: NDArray[np.float64], faces: NDArray[np.integer]) -> NDArray[np.float64]:
+def _inverses(corners: Floats, faces: NDArray[np.integer]) -> Floats:
     """(F, 9) M^-1, row by row, of every triangle; zeros for one that is seen from its edge."""
     inverses = np.zeros((len(faces), 3, 3))
     for f in range(len(faces)):
@@ -129,15 +127,8 @@ def _inverses(corners: NDArray[np.float64], faces: NDArray[np.integer]) -> NDArr
 
 @njit(cache=True)
 def _rays(
-    eye: NDArray[np.float64],
-    turn: NDArray[np.float64],
-    left: float,
-    top: float,
-    pixel: float,
-    rows: int,
-    columns: int,
-    supersample: int,
-) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+    eye: Floats, turn: Floats, left: float, top: float, pixel: float, rows: int, columns: int, supersample: int
+) -> tuple[Pictures, Pictures]:
     """Origins and directions (N, 3) float32 through the middles of every pixel's cells, pixel after pixel."""
     origins = np.empty((rows * columns * supersample * supersample, 3), np.float32)
     directions = np.empty_like(origins)
@@ -159,21 +150,24 @@ def _rays(
 def _shade(
     hit: NDArray[np.int32],
     place: tuple[float, float, float],
-    m: NDArray[np.float64],
+    m: Floats,
     faces: NDArray[np.integer],
-    normals: NDArray[np.float64],
-    uv: NDArray[np.float64],
-    texels: NDArray[np.float32],
+    normals: Floats,
+    uv: Floats,
+    texels: Pictures,
     start: NDArray[np.integer],
     shape: NDArray[np.integer],
     sharper: float,
-    lamp: NDArray[np.float64],
+    lamp: Floats,
     light: tuple[float, float, float],
-    radiance: NDArray[np.float32],
-    coverage: NDArray[np.float32],
-    depth: NDArray[np.float32],
+    radiance: Pictures,
+    coverage: Pictures,
+    depth: Pictures,
 ) -> None:
-    """Mean radiance and coverage of each pixel's rays, mean depth of those that hit."""
+    """Mean radiance and coverage of each pixel's rays, mean depth of those that hit.
+
+    `place` is (x, y) of the first pixel from the camera's axis, and the tangent of one pixel; m is from `_inverses`.
+    """
     left, top, pixel = place
     rows, columns, rays = hit.shape
     cells = round(sqrt(rays))
@@ -230,12 +224,7 @@ def _shade(
 
 @njit(cache=True)
 def _read(
-    texels: NDArray[np.float32],
-    start: NDArray[np.integer],
-    shape: NDArray[np.integer],
-    u: float,
-    v: float,
-    fineness: float,
+    texels: Pictures, start: NDArray[np.integer], shape: NDArray[np.integer], u: float, v: float, fineness: float
 ) -> float:
     """Texture at (u, v), blended between the two levels next to `fineness`."""
     fineness = min(max(fineness, 0.0), len(start) - 1.0)
@@ -249,7 +238,7 @@ def _read(
 
 
 @njit(cache=True)
-def _bilinear(texels: NDArray[np.float32], start: int, height: int, width: int, u: float, v: float) -> float:
+def _bilinear(texels: Pictures, start: int, height: int, width: int, u: float, v: float) -> float:
     """One level, repeated without end; row 0 is at v = 1."""
     x = (u - floor(u)) * width - 0.5
     y = (ceil(v) - v) * height - 0.5

@@ -17,7 +17,6 @@ from typing import Any
 from weakref import WeakKeyDictionary, finalize
 
 import numpy as np
-from numpy.typing import NDArray
 
 from scenes.renderers import contexts
 from scenes.renderers.protocol import Lighting, PictureWindow, Pinhole, Sprite, Surface
@@ -36,6 +35,7 @@ from scenes.renderers.view import (
 )
 from spikecam_env.compiled import njit
 from spikecam_env.errors import NotReadyError
+from spikecam_env.types import Floats, Pictures
 
 LARGEST = 4096
 """Rays a side drawn at once; larger windows are drawn in tiles.  Every OpenGL 4.1 draws 16384; this is 270 MB."""
@@ -46,9 +46,12 @@ SHADERS = Path(__file__).parent / "shaders"
 class OpenGL:
     """Back-end by OpenGL; see `scenes.renderers.protocol.Renderer`.
 
-    kind    "egl-hardware", "egl-software" or "osmesa"; one process serves EGL or OSMesa, not both
-    Errors: RuntimeError, ImportError and others of the libraries, where the machine cannot (`choose_renderer` says
-    it in one line); NotReadyError for use in a forked process, where OpenGL would hang, or in another thread.
+    Args:
+        kind: "egl-hardware", "egl-software" or "osmesa"; one process serves EGL or OSMesa, not both.
+
+    Raises:
+        RuntimeError: this OpenGL does not draw; errors of the libraries pass through (`choose_renderer` sums them up).
+        NotReadyError: it is used in another thread, or in a forked process, where OpenGL would hang.
     """
 
     def __init__(self, kind: str) -> None:
@@ -75,7 +78,7 @@ class OpenGL:
     def render(
         self,
         surface: Surface,
-        pose: NDArray[np.float64],
+        pose: Floats,
         camera: Pinhole,
         lighting: Lighting,
         window: PictureWindow,
@@ -106,7 +109,7 @@ class OpenGL:
             self._end()
 
     def _enter(self) -> None:
-        """The context is current, and what belonged to surfaces that are gone is given back."""
+        """Make the context current, and release the memory of surfaces that are gone."""
         if not self._end.alive:
             raise NotReadyError("this renderer is closed; make a new one with choose_renderer()")
         if self._home != _here():
@@ -124,14 +127,7 @@ class OpenGL:
             finalize(surface, self._forgotten.append, self._kept[surface]).atexit = False
         return self._kept[surface]
 
-    def _light(
-        self,
-        surface: Surface,
-        uploaded: _Uploaded,
-        pose: NDArray[np.float64],
-        matrix: NDArray[np.float64],
-        lighting: Lighting,
-    ) -> None:
+    def _light(self, surface: Surface, uploaded: _Uploaded, pose: Floats, matrix: Floats, lighting: Lighting) -> None:
         gl = self._gl
         gl.glUseProgram(self._surface_program._program_id)
         at = self._at(self._surface_program)
@@ -142,7 +138,7 @@ class OpenGL:
         gl.glUniform1f(at("levels"), float(len(uploaded.geometry.albedo.start)))
         gl.glUniform1f(at("sharper"), SHARPER)
 
-    def _abilities(self, geometry: SurfaceArrays, matrix: NDArray[np.float64]) -> list[Any]:
+    def _abilities(self, geometry: SurfaceArrays, matrix: Floats) -> list[Any]:
         """Without back faces where they are hidden, in a closed surface seen from outside: a quarter faster."""
         gl = self._gl
         gl.glFrontFace(gl.GL_CW if np.linalg.det(matrix) > 0 else gl.GL_CCW)  # in the picture y points down
@@ -152,12 +148,7 @@ class OpenGL:
         return [gl.GL_SCISSOR_TEST, gl.GL_DEPTH_TEST, *hidden]
 
     def _draw(
-        self,
-        uploaded: _Uploaded,
-        to_window: NDArray[np.float64],
-        tile: PictureWindow,
-        supersample: int,
-        abilities: list[Any],
+        self, uploaded: _Uploaded, to_window: Floats, tile: PictureWindow, supersample: int, abilities: list[Any]
     ) -> None:
         gl = self._gl
         targets = self._targets_for(tile, supersample)
@@ -204,7 +195,7 @@ class OpenGL:
         return self._targets
 
     def _at(self, program: Any) -> Callable[[str], int]:
-        """Where its uniforms are.  OpenGL is asked once: through Python that takes longer than to set one."""
+        """Places of its uniforms, each requested of OpenGL once: through Python that takes longer than to set one."""
         known = self._uniforms.setdefault(program._program_id, {})
 
         def place(name: str) -> int:
@@ -286,20 +277,15 @@ def _end(context: contexts.Context, home: tuple[int, int]) -> None:
 
 
 @njit(nogil=True, cache=True)
-def _split(
-    values: NDArray[np.float32],
-    radiance: NDArray[np.float32],
-    coverage: NDArray[np.float32],
-    depth: NDArray[np.float32],
-) -> None:
-    """What was read (rows, columns, 4) into pictures of its own; where nothing is seen it is infinitely far."""
+def _split(values: Pictures, radiance: Pictures, coverage: Pictures, depth: Pictures) -> None:
+    """Split values (rows, columns, 4) into pictures; uncovered pixels are infinitely far."""
     for row in range(values.shape[0]):
         for x in range(values.shape[1]):
             radiance[row, x], coverage[row, x] = values[row, x, 0], values[row, x, 1]
             depth[row, x] = values[row, x, 2] if values[row, x, 1] != 0 else np.inf
 
 
-def _to_window(camera: Pinhole, window: PictureWindow, near: float, far: float) -> NDArray[np.float64]:
+def _to_window(camera: Pinhole, window: PictureWindow, near: float, far: float) -> Floats:
     """(4, 4) camera to clip coordinates of a window: pixel centres at half cells, the picture's first row first."""
     matrix = np.zeros((4, 4))
     matrix[0, 0] = 2 * camera.focal / window.columns

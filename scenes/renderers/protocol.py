@@ -1,4 +1,4 @@
-"""What a renderer is: one surface at one pose, seen by a pinhole camera, as a picture of linear light.
+"""A renderer draws one surface at one pose, seen by a pinhole camera, as a picture of linear light.
 
 World and camera follow OpenGL: the camera looks along its -z, x to the right, y up.  Pictures follow
 `scenes.protocol`: x to the right, y down, pixel (r, c) has its centre at (x, y) = (c, r).  A point (X, Y, Z)
@@ -17,28 +17,25 @@ from typing import Any, Protocol
 
 import numpy as np
 import trimesh
-from numpy.typing import NDArray
 
 from spikecam_env.renamed import old_names
-from spikecam_env.types import Pictures
+from spikecam_env.types import Floats, Pictures
 
 
 @dataclass(frozen=True, eq=False)
 class Surface:
-    """A mesh and its reflection.  Compared by identity, so that a back-end may keep what it has uploaded.
-
-    mesh      in its own coordinates, with `visual.uv` where albedo is a texture
-    albedo    0..1, linear: one value, one for each vertex (V,), linear between them, or a texture (h, w) float32; row 0
-              is the top, v = 1
-    emission  radiance that the surface gives by itself
-    """
+    """A mesh and its reflection.  Compared by identity, so that a back-end may keep its own form of it."""
 
     mesh: trimesh.Trimesh
+    """In its own coordinates, with `visual.uv` where albedo is a texture."""
     albedo: float | Pictures = 0.8
+    """0..1, linear: one value, one for each vertex (V,), linear between them, or a texture (h, w) float32; row 0 is the
+    top, v = 1."""
     emission: float = 0.0
+    """Radiance that the surface gives by itself."""
 
     @cached_property
-    def middle(self) -> NDArray[np.float64]:
+    def middle(self) -> Floats:
         """(3,) of the box about the mesh."""
         return np.asarray(self.mesh.bounds.mean(axis=0))
 
@@ -49,11 +46,14 @@ class Surface:
 
 @dataclass(frozen=True, eq=False)
 class Pinhole:
-    """focal [pixels], centre (x, y) [pixels], pose (4, 4) camera to world."""
+    """A camera without distortion."""
 
     focal: float
+    """[pixels]"""
     centre: tuple[float, float]
-    pose: NDArray[np.float64]
+    """(x, y) [pixels]"""
+    pose: Floats
+    """(4, 4) camera to world."""
 
 
 @dataclass(frozen=True)
@@ -77,29 +77,29 @@ class PictureWindow:
 
 @dataclass(frozen=True)
 class Sprite:
-    """A surface alone, cut to a window.
-
-    radiance  (rows, columns) float32, premultiplied: light times coverage
-    coverage  (rows, columns) float32 in [0, 1], share of the pixel that the surface covers
-    depth     (rows, columns) float32, distance along the camera's axis; inf where nothing is covered
-    """
+    """A surface alone, cut to a window."""
 
     window: PictureWindow
     radiance: Pictures
+    """(rows, columns) float32, premultiplied: light times coverage."""
     coverage: Pictures
+    """(rows, columns) float32 in [0, 1], share of the pixel that the surface covers."""
     depth: Pictures
+    """(rows, columns) float32, distance along the camera's axis; inf where nothing is covered."""
 
 
 class Renderer(Protocol):
-    """A back-end.  name: what the log says, e.g. "EGL (llvmpipe)"."""
+    """A back-end."""
 
     @property
-    def name(self) -> str: ...
+    def name(self) -> str:
+        """Its name in the log, e.g. "EGL (llvmpipe)"."""
+        ...
 
     def render(
         self,
         surface: Surface,
-        pose: NDArray[np.float64],
+        pose: Floats,
         camera: Pinhole,
         lighting: Lighting,
         window: PictureWindow,
@@ -110,7 +110,7 @@ class Renderer(Protocol):
         ...
 
     def close(self) -> None:
-        """Give back what the back-end holds."""
+        """Release the memory and the context of the back-end."""
         ...
 
 

@@ -26,16 +26,14 @@ SHARPER = -0.5
 
 @dataclass(frozen=True)
 class Pyramid:
-    """Levels of a texture end to end.
-
-    texels   (N,) float32, level after level, each row-major from the top
-    start    (L,) int64, where a level begins
-    shape    (L, 2) int64, its (h, w)
-    """
+    """Levels of a texture end to end."""
 
     texels: Pictures
+    """(N,) float32, level after level, each row-major from the top."""
     start: NDArray[np.int64]
+    """(L,) int64, where a level begins."""
     shape: NDArray[np.int64]
+    """(L, 2) int64, its (h, w)."""
 
     def level(self, index: int) -> Pictures:
         """(h, w), a view."""

@@ -1,8 +1,8 @@
 """pyrender without a window, on the versions of today.
 
-pyrender 0.1.45 is dormant: its viewer pulls in pyglet and X11, and it needs to be told of headless OpenGL before
+pyrender 0.1.45 is dormant: its viewer pulls in pyglet and X11, and the platform of headless OpenGL must be set before
 PyOpenGL is first imported.  Of pyrender we use the EGL contexts, the upload of meshes and the shader programs.
-What it has wrong is not touched at all: 8-bit gamma-encoded pictures, `Mesh.bounds` (np.infty), `Texture` (unaligned
+Its faulty parts are not used: 8-bit gamma-encoded pictures, `Mesh.bounds` (np.infty), `Texture` (unaligned
 rows, glGenTextures of PyOpenGL 3.1.0 on Python >= 3.12), `OffscreenRenderer.delete` (ends everybody's contexts).
 """
 
@@ -23,8 +23,9 @@ _PLATFORM = "PYOPENGL_PLATFORM"
 def import_pyrender(platform: str) -> Any:
     """The package pyrender over PyOpenGL's `platform`, "egl" or "osmesa".
 
-    Errors: NotReadyError where PyOpenGL already serves another platform: there is one a process; ImportError and others
-    where the system lacks its libraries.
+    Raises:
+        NotReadyError: PyOpenGL already serves another platform: there is one a process.
+        ImportError: the system lacks the libraries; other errors of theirs pass through.
     """
     if "OpenGL.platform" in sys.modules and os.environ.get(_PLATFORM) != platform:
         raise NotReadyError(
@@ -32,7 +33,7 @@ def import_pyrender(platform: str) -> Any:
             f"start a new process for {platform}"
         )
     os.environ[_PLATFORM] = platform
-    logging.getLogger("OpenGL.acceleratesupport").setLevel(logging.WARNING)  # or it says at each start what it lacks
+    logging.getLogger("OpenGL.acceleratesupport").setLevel(logging.WARNING)  # else it lists missing parts at each start
     if "pyrender.viewer" not in sys.modules:
         stub: Any = types.ModuleType("pyrender.viewer")
         stub.Viewer = None

@@ -1,7 +1,7 @@
 """The renderer that the scenes of a thread share, unless they were given one.
 
-It is chosen when first asked for.  Environments say that they use it; it goes when the last of them is closed, and a
-scene that draws after that gets a new one.
+It is chosen on first use.  Environments register as users; it is closed with the last of them, and a scene that draws
+after that gets a new one.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ _users: WeakSet[object] = WeakSet()
 
 
 def shared_renderer() -> Renderer:
-    """This thread's."""
+    """The renderer of this thread."""
     from scenes.renderers.choose import choose_renderer
 
     if _here.renderer is None or _here.process != os.getpid():
@@ -33,12 +33,12 @@ def shared_renderer() -> Renderer:
     return _here.renderer
 
 
-def begin_to_use(user: object) -> None:
-    """Keep the shared renderer until this user is done, or gone."""
+def register_user(user: object) -> None:
+    """Keep the shared renderer until this user is released, or collected."""
     _users.add(user)
 
 
-def done_with(user: object) -> None:
+def release_user(user: object) -> None:
     """Close the shared renderer where nobody else uses it; may be called again."""
     _users.discard(user)
     if not _users and _here.renderer is not None and _here.process == os.getpid():

@@ -12,7 +12,7 @@ from scenes.renderers.protocol import Lighting, PictureWindow, Pinhole, Surface
 
 
 def draw(name: str) -> None:
-    """Errors: whatever the back-end raises; RuntimeError where the triangle's light is wrong."""
+    """Draw one triangle, and fail where its light is wrong."""
     triangle = trimesh.Trimesh([(-9, -9, -5), (9, -9, -5), (0, 9, -5)], [(0, 1, 2)], process=False)
     camera = Pinhole(focal=8.0, centre=(3.5, 3.5), pose=np.eye(4))
     renderer = OpenGL(name)

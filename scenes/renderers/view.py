@@ -1,4 +1,4 @@
-"""What every back-end needs before it draws: a surface as checked arrays, and the part of the window it can reach.
+"""Preparation for every back-end: a surface as checked arrays, and the part of the window it can reach.
 
 Nothing here knows of OpenGL or of rays.
 """
@@ -16,6 +16,7 @@ from scenes.renderers.protocol import Lighting, PictureWindow, Pinhole, Sprite, 
 from scenes.renderers.pyramid import Pyramid, pyramid
 from scenes.renderers.ramp import places, ramp_level
 from spikecam_env.errors import InputError
+from spikecam_env.types import Floats
 
 ROUNDING = 1e-5
 """By which luminance in single precision may exceed 1."""
@@ -25,27 +26,28 @@ NEAREST = 1e-3
 
 @dataclass(frozen=True)
 class SurfaceArrays:
-    """A surface as arrays.
+    """A surface as arrays."""
 
-    vertices, normals  (V, 3) float64
-    uv                 (V, 2) float64; zeros where the albedo is one value, places on the ramp where it is one for each
-                       vertex
-    faces              (F, 3) int32
-    albedo             the texture and its reductions; one texel where the albedo is one value
-    closed             whether the mesh bounds a volume, faces outwards: from outside only front faces are seen
-    """
-
-    vertices: NDArray[np.float64]
-    normals: NDArray[np.float64]
-    uv: NDArray[np.float64]
+    vertices: Floats
+    normals: Floats
+    """(V, 3) float64."""
+    uv: Floats
+    """(V, 2) float64; zeros where the albedo is one value, places on the ramp where it is one for each vertex."""
     faces: NDArray[np.int32]
+    """(F, 3) int32."""
     albedo: Pyramid
+    """The texture and its reductions; one texel where the albedo is one value."""
     closed: bool
+    """Whether the mesh bounds a volume, faces outwards: from outside only front faces are seen."""
 
 
 def geometry(surface: Surface) -> SurfaceArrays:
-    """Errors: InputError for a mesh that `check_mesh` refuses, a texture without uv, or an albedo that is not one
-    value, (V,) or (h, w), in 0 to 1."""
+    """A surface as checked arrays.
+
+    Raises:
+        InputError: `check_mesh` refuses the mesh, a texture has no uv, or the albedo is not one value, (V,) or (h, w),
+            in 0 to 1.
+    """
     mesh = surface.mesh
     check_mesh(mesh)
     albedo = np.asarray(surface.albedo, np.float32)
@@ -78,8 +80,7 @@ def geometry(surface: Surface) -> SurfaceArrays:
 
 
 def check_mesh(mesh: trimesh.Trimesh) -> None:
-    """Errors: InputError for a mesh without triangles or area, vertices that are not finite, faces of others than it
-    has."""
+    """Refuse a mesh without triangles or area, with vertices that are not finite, or faces of missing vertices."""
     faces = np.asarray(mesh.faces)
     if len(faces) == 0:
         raise InputError("the mesh of a surface has no triangles; give one with faces")
@@ -101,31 +102,35 @@ def check_mesh(mesh: trimesh.Trimesh) -> None:
         raise InputError("the mesh has no area: every triangle is a line or a point")
 
 
-def check_albedo(albedo: ArrayLike, what: str) -> None:
-    """Errors: InputError, which begins with `what`, for values out of 0 to 1, but for their rounding."""
+def check_albedo(albedo: ArrayLike, name: str) -> None:
+    """Refuse values out of 0 to 1, but for their rounding; the message begins with `name`."""
     values = np.asarray(albedo)
     low, high = values.min(), values.max()
     if not (low >= 0 and high <= 1 + ROUNDING):
         raise InputError(
-            f"{what} runs from {low:g} to {high:g}; a surface reflects 0 to 1 of the light, finite.  Scale it, or give "
+            f"{name} runs from {low:g} to {high:g}; a surface reflects 0 to 1 of the light, finite.  Scale it, or give "
             "light of its own as emission"
         )
 
 
-def to_camera(pose: NDArray[np.float64], camera: Pinhole) -> NDArray[np.float64]:
-    """(4, 4): a surface's coordinates to the camera's.  Errors: InputError where a pose cannot be inverted."""
+def to_camera(pose: Floats, camera: Pinhole) -> Floats:
+    """(4, 4): a surface's coordinates to the camera's.
+
+    Raises:
+        InputError: a pose has no inverse.
+    """
     for name, matrix in (("pose", pose), ("camera.pose", camera.pose)):
         if np.shape(matrix) != (4, 4) or not np.isfinite(matrix).all() or np.linalg.det(matrix) == 0:
             raise InputError(f"{name} is\n{np.asarray(matrix)}\nit must be a (4, 4) matrix that can be inverted")
     return np.linalg.inv(camera.pose) @ pose
 
 
-def moved(points: NDArray[np.float64], matrix: NDArray[np.float64]) -> NDArray[np.float64]:
+def moved(points: Floats, matrix: Floats) -> Floats:
     """Points (N, 3) through a (4, 4) matrix."""
     return np.asarray(points @ matrix[:3, :3].T + matrix[:3, 3])
 
 
-def reached(vertices: NDArray[np.float64], camera: Pinhole, window: PictureWindow) -> PictureWindow | None:
+def reached(vertices: Floats, camera: Pinhole, window: PictureWindow) -> PictureWindow | None:
     """The part of the window that these vertices (N, 3) in camera coordinates can cover; None where none."""
     distance = -vertices[:, 2]
     if distance.max() <= 0:
@@ -139,8 +144,12 @@ def reached(vertices: NDArray[np.float64], camera: Pinhole, window: PictureWindo
     return PictureWindow(top, left, bottom - top, right - left) if top < bottom and left < right else None
 
 
-def towards(lighting: Lighting) -> NDArray[np.float64]:
-    """(3,) unit vector to the lamp.  Errors: InputError for a zero direction."""
+def towards(lighting: Lighting) -> Floats:
+    """(3,) unit vector to the lamp.
+
+    Raises:
+        InputError: the direction is zero.
+    """
     direction = np.asarray(lighting.towards, np.float64)
     length = np.linalg.norm(direction)
     if direction.shape != (3,) or not 0 < length < np.inf:
@@ -166,7 +175,7 @@ def pasted(part: Sprite, window: PictureWindow) -> Sprite:
 
 
 def checked(window: PictureWindow, supersample: int) -> None:
-    """Errors: InputError for an empty window or no rays."""
+    """Refuse an empty window, and no rays."""
     if window.rows < 1 or window.columns < 1:
         raise InputError(f"the window has {window.rows} rows and {window.columns} columns; it needs some of each")
     if supersample < 1:
@@ -179,7 +188,7 @@ def _closed(mesh: trimesh.Trimesh) -> bool:
     return bool(sewn.is_volume)
 
 
-def _overlap(positions: NDArray[np.float64], first: int, count: int) -> tuple[int, int]:
+def _overlap(positions: Floats, first: int, count: int) -> tuple[int, int]:
     """Pixels [start, stop) of a row of `count` that an interval of positions touches."""
     low = np.clip(np.floor(positions.min() + 0.5), first, first + count)
     high = np.clip(np.floor(positions.max() + 0.5) + 1, first, first + count)

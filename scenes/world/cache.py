@@ -1,7 +1,7 @@
-"""What a world keeps for its next call.
+"""Results that a world keeps for its next call.
 
 Everything in it follows from the world: an entry that is dropped is made again, bit for bit.  Each kind has a limit of
-its own, in entries; the entry asked for least recently goes first.  A copied or unpickled world begins with nothing.
+its own, in entries; the entry used least recently goes first.  A copied or unpickled world begins with nothing.
 """
 
 from __future__ import annotations
@@ -11,14 +11,12 @@ from collections.abc import Callable, Hashable
 from dataclasses import dataclass
 from typing import Generic, TypeVar
 
-import numpy as np
-from numpy.typing import NDArray
-
 from scenes.layers import BodyKey
 from scenes.renderers.protocol import PictureWindow, Pinhole, Sprite
 from scenes.world.extent import Probe, probe_of
 from scenes.world.plan import BlockPlan, Pace
 from scenes.world.spec import WorldSpec
+from spikecam_env.types import Floats, Pictures
 
 PLANS = 64
 """Blocks whose plans are kept: 0.4 s of the camera's time."""
@@ -38,17 +36,18 @@ T = TypeVar("T")
 
 @dataclass(frozen=True, eq=False)
 class Sight:
-    """A body before the camera at a frame, and what is rendered of it.  view: (4, 4) from its coordinates to the
-    camera's."""
+    """A body before the camera at a frame."""
 
-    pose: NDArray[np.float64]
+    pose: Floats
     camera: Pinhole
-    view: NDArray[np.float64]
+    view: Floats
+    """(4, 4) from its coordinates to the camera's."""
     window: PictureWindow
+    """The part of the picture that is rendered."""
 
 
 class RecentResults(Generic[T]):
-    """The results asked for most recently, by name: at most `most` of them, and at least one."""
+    """The results used most recently, by name: at most `most` of them, and at least one."""
 
     def __init__(self, most: int) -> None:
         self.most = max(most, 1)
@@ -57,12 +56,12 @@ class RecentResults(Generic[T]):
     def __len__(self) -> int:
         return len(self._kept)
 
-    def take(self, other: RecentResults[T]) -> None:
-        """Know what another one knows."""
+    def update(self, other: RecentResults[T]) -> None:
+        """Add the results of another one."""
         self._kept.update(other._kept)
 
     def get(self, name: Hashable, make: Callable[[], T]) -> T:
-        """What is kept by this name, or what `make` returns, which is kept from now on."""
+        """The result of this name; where there is none, that of `make`, which is kept from now on."""
         if name not in self._kept:
             self._kept[name] = make()
             while len(self._kept) > self.most:
@@ -73,27 +72,25 @@ class RecentResults(Generic[T]):
 
 @dataclass(frozen=True, eq=False)
 class WorldCache:
-    """One world's.  For B bodies at most:
-
-    plans       64 plans of blocks
-    paces       64 B, of each body in each of these
-    probes      B, one a body
-    sights      4 B + 8, where bodies are at key times
-    keys        4 B + 8 bodies rendered at key times: what takes the memory, 72 bytes a pixel of each key's window,
-                up to 37 MB at 250 x 400 of a body that fills the picture and its surroundings
-    backdrops   2 B backdrops rendered at an instant, 12 bytes a pixel
-    tile        1 background picture at one texel a pixel
-    base        1 picture of all that stands still behind the bodies
-    """
+    """One world's.  For B bodies at most:"""
 
     plans: RecentResults[BlockPlan]
+    """64 plans of blocks."""
     paces: RecentResults[Pace]
+    """64 B, of each body in each of these."""
     probes: RecentResults[Probe]
+    """B, one a body."""
     sights: RecentResults[Sight]
+    """4 B + 8, where bodies are at key times."""
     keys: RecentResults[BodyKey]
+    """4 B + 8 bodies rendered at key times.  These take the memory: 72 bytes a pixel of each key's window, up to 37 MB
+    at 250 x 400."""
     backdrops: RecentResults[Sprite]
-    tile: RecentResults[NDArray[np.float32]]
-    base: RecentResults[NDArray[np.float32]]
+    """2 B backdrops rendered at an instant, 12 bytes a pixel."""
+    tile: RecentResults[Pictures]
+    """1 background picture at one texel a pixel."""
+    base: RecentResults[Pictures]
+    """1 picture of all that stands still behind the bodies."""
 
     @classmethod
     def of(cls, bodies: int) -> WorldCache:
@@ -109,11 +106,11 @@ class WorldCache:
             base=RecentResults(1),
         )
 
-    def take_motion(self, other: WorldCache) -> None:
-        """What another world knows that differs in its light alone: plans, paces and probes."""
-        self.plans.take(other.plans)
-        self.paces.take(other.paces)
-        self.probes.take(other.probes)
+    def update_motion(self, other: WorldCache) -> None:
+        """Add plans, paces and probes of a world that differs in its light alone."""
+        self.plans.update(other.plans)
+        self.paces.update(other.paces)
+        self.probes.update(other.probes)
 
     def probe(self, spec: WorldSpec, body: int) -> Probe:
         """The points that stand for a body of the world."""

@@ -52,7 +52,7 @@ def _directions() -> Floats:
 
 
 def extent(extreme: Floats, view: Floats, focal: float, centre: Floats) -> Boxes:
-    """Boxes (n, 4) of pixels around what these points span: top, left, bottom, right; wide if some are behind."""
+    """Boxes (n, 4) of pixels around these points: top, left, bottom, right; wide if some are behind."""
     pixels, depth = project(view, extreme, focal, (0.0, 0.0))
     pixels = pixels + centre[:, None]
     low, high = pixels.min(1), pixels.max(1)

@@ -57,7 +57,7 @@ def paint(
     return [pool().submit(_compose, pictures, base, layers, int(a), int(b)) for a, b in pairwise(cuts)]
 
 
-# -- what lies behind all layers -------------------------------------------------------------------------------
+# -- the picture behind all layers -----------------------------------------------------------------------------
 
 
 def _skies(spec: WorldSpec, cache: WorldCache, frames: Floats, gaze: Gaze | None) -> Pictures:

@@ -1,4 +1,4 @@
-"""The plan of a block of frames: what follows from the motion in it alone.
+"""The plan of a block of frames: it follows from the motion in the block alone.
 
 How often light is given and the order in which bodies are laid over each other (`plan_block`), and how often each body
 is rendered (`pace_of`; `scenes.layers` carries it in between).  So a key's time and light depend on nothing but the
@@ -11,14 +11,13 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from scenes.layers import fit, project
 from scenes.protocol import Gaze
 from scenes.renderers.protocol import Lighting
 from scenes.world.extent import Probe, boxes_overlap, extent
 from scenes.world.spec import WorldSpec
-from spikecam_env.types import Floats
+from spikecam_env.types import Floats, Masks
 
 BLOCK = 256
 """Frames that are planned together."""
@@ -27,7 +26,7 @@ NODES = 32
 """Steps between the instants at which a block's motion is looked at."""
 
 LONGEST_STEP = 64
-"""Frames between two keys of light, at most: what the sensor integrates in one go."""
+"""Frames between two keys of light, at most: the sensor integrates so many in one go."""
 
 SHORTEST_KEY_STEP = 16
 """Frames between two keys of a body, at least: 2500 a second at 40 kHz."""
@@ -36,33 +35,31 @@ BLUR = 0.5
 """Most that the two keys of a body may disagree on a place half-way between them, rms [pixels]."""
 
 FLAT = 0.1
-"""The same, of keys that are carried by a polynomial alone: what is off by more is carried by its depth too."""
+"""The same, of keys that are carried by a polynomial alone; those further off are carried by depth too."""
 
 SHADE = 0.01
 """Most that shading half-way may differ from the mean of both keys, rms of full light."""
 
 TURN = 0.07
 """Most that a surface's slant to the line of sight changes from key to key, rms of its cosine: a ball may turn by
-0.12 radians, and what comes round its edge is 0.7 % of its radius."""
+0.12 radians, by which 0.7 % of its radius comes round its edge."""
 
 
 @dataclass(frozen=True)
 class BlockPlan:
-    """What follows from the motion in a block, of all bodies together.
-
-    block    its number
-    speed    fastest point in the picture [pixels/frame]
-    order    bodies from the back to the front
-    tested   bodies whose depth is compared with what lies there;  marked: those that are compared with
-    still    camera and backdrops do not move
-    """
+    """Consequences of the motion in a block, of all bodies together."""
 
     block: int
     speed: float
+    """Fastest point in the picture [pixels/frame]."""
     order: tuple[int, ...]
+    """Bodies from the back to the front."""
     tested: frozenset[int]
+    """Bodies whose depth is compared with that of bodies laid before."""
     marked: frozenset[int]
+    """Bodies that others are compared with."""
     still: bool
+    """Camera and backdrops do not move."""
 
     def light_step(self, motion_per_key: float, gaze: Gaze | None) -> int:
         """Frames between keys of light, a power of two: nothing moves by more than motion_per_key [pixels] in it."""
@@ -81,9 +78,10 @@ def blocks_of(start: int, stop: int) -> range:
 def key_frames(light_steps: Mapping[int, int], start: int, stop: int, with_ends: bool) -> Floats:
     """Frames (K,) of the keys of light that cover [start, stop].
 
-    light_steps   frames between keys in each of `blocks_of(start, stop)`
-    with_ends     keys at start and stop, and those of the grid between; else the grid alone, from the last key at or
-                  before start to the first at or after stop
+    Args:
+        light_steps: frames between keys in each of `blocks_of(start, stop)`.
+        with_ends: keys at start and stop, and those of the grid between; else the grid alone, from the last key at or
+            before start to the first at or after stop.
     """
     frames = [np.arange(block * BLOCK, (block + 1) * BLOCK, step) for block, step in light_steps.items()]
     grid = np.append(np.concatenate(frames), -(-stop // BLOCK) * BLOCK).astype(np.float64)
@@ -113,22 +111,20 @@ def _instants(block: int) -> Floats:
 
 @dataclass(frozen=True, eq=False)
 class _Motion:
-    """A body in a block.
-
-    depths        nearest and farthest that it comes to the camera's plane
-    box           of pixels, all that it is seen in: top, left, bottom, right
-    speed         fastest in the picture [pixels/frame]
-    rests         it does not move before the camera
-    """
+    """A body in a block."""
 
     depths: tuple[float, float]
+    """Nearest and farthest that it comes to the camera's plane."""
     box: tuple[int, ...]
+    """Of pixels, all that it is seen in: top, left, bottom, right."""
     speed: float
+    """Fastest in the picture [pixels/frame]."""
     rests: bool
+    """It does not move before the camera."""
 
 
 def plan_block(spec: WorldSpec, probes: Sequence[Probe], block: int) -> BlockPlan:
-    """BlockPlan frames block * BLOCK .. (block + 1) * BLOCK; probes: one a body."""
+    """The plan of frames block * BLOCK .. (block + 1) * BLOCK, with one probe a body."""
     frames = _instants(block)
     sky_speed = _sky_speed(spec, frames)
     motions = [_motion(spec, body, probe, frames) for body, probe in enumerate(probes)]
@@ -214,7 +210,7 @@ def _middle_is_lit_like_the_ends(facing: Floats, depth: Floats, shade: Floats) -
     return bool(not shown.any() or np.sqrt((shading**2).mean()) <= SHADE)
 
 
-def _shown(facing: Floats, depth: Floats) -> NDArray[np.bool_]:
+def _shown(facing: Floats, depth: Floats) -> Masks:
     """Points that are seen half-way."""
     return np.asarray((facing[len(facing) // 2] > 0.05) & (depth > 0).all(0))
 
@@ -231,10 +227,10 @@ def _misplaced(pixels: Floats, depth: Floats, facing: Floats, sight: Floats) -> 
     slope = np.sqrt(np.maximum(1 - cosine**2, 0)) / cosine
     flat, left = [], []
     for end in (0, -1):
-        reference, found = fit(pixels[end, shown], pixels[middle : middle + 1, shown])
+        reference, coefficients = fit(pixels[end, shown], pixels[middle : middle + 1, shown])
         u, v = ((pixels[middle, shown] - reference[0, :2]) * reference[0, 2]).T
         basis = np.stack([np.ones_like(u), u, v, u * u, u * v, v * v])
-        flat.append((found[0] @ basis).T - pixels[end, shown])
+        flat.append((coefficients[0] @ basis).T - pixels[end, shown])
         turned = np.linalg.norm(sight[end, shown] - sight[middle, shown], axis=-1)
         left.append(flat[-1] * np.minimum(turned * slope, 1)[:, None])
     by_polynomial, by_depth = (float(np.sqrt(((a - b) ** 2).sum(-1).mean())) for a, b in (flat, left))

@@ -1,4 +1,4 @@
-"""What a world is made of, and where its camera sees it at a frame."""
+"""Bodies, camera and light of a world, and the view of its camera at a frame."""
 
 from __future__ import annotations
 
@@ -20,23 +20,23 @@ from spikecam_env.types import Floats, Pictures
 class Body:
     """A surface that moves.
 
-    backdrop   laid first, in the order given; nothing ever goes behind it (a floor, a wall)
-
-    >>> from scenes.meshes import assemble, sphere
-    >>> from scenes.trajectories import Ballistic
-    >>> Body("ball", assemble(sphere(0.2)), Ballistic(velocity=(3.0, 2.0, 0.0))).name
-    'ball'
+    Example:
+        >>> from scenes.meshes import assemble, sphere
+        >>> from scenes.trajectories import Ballistic
+        >>> Body("ball", assemble(sphere(0.2)), Ballistic(velocity=(3.0, 2.0, 0.0))).name
+        'ball'
     """
 
     name: str
     surface: Surface
     trajectory: Trajectory = AT_REST
     backdrop: bool = False
+    """Laid first, in the order given; nothing ever goes behind it (a floor, a wall)."""
 
 
 @dataclass(frozen=True, eq=False)
 class WorldSpec:
-    """What a world is made of; see `scenes.world.World`, which is one.  Bodies are named by their place in `bodies`."""
+    """Bodies, camera and light of a world; see `scenes.world.World`.  A body's number is its place in `bodies`."""
 
     shape: tuple[int, int]
     bodies: tuple[Body, ...]

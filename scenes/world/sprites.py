@@ -5,14 +5,13 @@ from __future__ import annotations
 import dataclasses
 
 import numpy as np
-from numpy.typing import NDArray
 
 from scenes.protocol import Gaze
 from scenes.renderers.protocol import PictureWindow, Pinhole, Sprite
 from scenes.world.cache import Sight, WorldCache
 from scenes.world.extent import extent, window_around
 from scenes.world.spec import WorldSpec, gaze_offsets
-from spikecam_env.types import Pictures
+from spikecam_env.types import Masks, Pictures
 
 TRUTH_RAYS = 4
 """Of a pixel, along either side, where a body is rendered at an instant itself."""
@@ -46,10 +45,11 @@ def sight_of(spec: WorldSpec, cache: WorldCache, body: int, frame: float, camera
     return Sight(pose, camera, view, window_around(box, spec.shape, margin))
 
 
-def lay_over(picture: Pictures, sprite: Sprite, depth: Pictures) -> NDArray[np.bool_]:
-    """Lay a sprite over a picture (H, W), in place, but where the picture is nearer.
+def lay_over(picture: Pictures, sprite: Sprite, depth: Pictures) -> Masks:
+    """Lay a sprite over a picture (H, W) of depth (H, W), in place, but where the picture is nearer.
 
-    depth: (H, W) of the picture.  Returns where the sprite is what is seen, of its window.
+    Returns:
+        Pixels of the sprite's window in which it is seen.
     """
     place = place_of(sprite.window)
     front = (sprite.coverage > 0) & (sprite.depth <= depth[place])

@@ -22,7 +22,7 @@ _NO_GAZE = Gaze.fixed(0.0, 0.0)
 
 @dataclass(frozen=True, eq=False)
 class VisibleBodies:
-    """Pictures (H, W) of an instant.  owner: what is seen, the number of a body from 1, or 0, the background."""
+    """Pictures (H, W) of an instant; `owner` is the number of the body seen, from 1, or 0, the background."""
 
     radiance: Pictures
     depth: Pictures
@@ -30,7 +30,7 @@ class VisibleBodies:
 
 
 def truth_at(spec: WorldSpec, cache: WorldCache, plan: BlockPlan, frame: float, gaze: Gaze | None) -> Truth:
-    """See `scenes.world.World.truth`; plan: of the frame's block."""
+    """See `scenes.world.World.truth`; the plan is that of the frame's block."""
     seen = seen_at(spec, cache, plan, frame, gaze, TRUTH_RAYS)
     ahead, behind = (_displaced(spec, seen, frame, by, gaze) for by in (0.5, -0.5))
     poses = {body.name: _pose_numbers(spec.pose(number, frame)) for number, body in enumerate(spec.bodies)}
@@ -42,7 +42,7 @@ def truth_at(spec: WorldSpec, cache: WorldCache, plan: BlockPlan, frame: float, 
 def seen_at(
     spec: WorldSpec, cache: WorldCache, plan: BlockPlan, frame: float, gaze: Gaze | None, rays: int
 ) -> VisibleBodies:
-    """What the camera sees at a frame, by rays x rays a pixel; plan: of the frame's block."""
+    """The camera's view at a frame, by rays x rays a pixel; the plan is that of the frame's block."""
     picture = sky(spec, cache, frame, gaze_offsets(gaze, np.array([frame]))[0])
     depth = np.full(spec.shape, np.inf, np.float32)
     nearest = depth.copy()
@@ -76,7 +76,7 @@ def places_at(spec: WorldSpec, frame: float, gaze: Gaze | None) -> dict[str, tup
 
 
 def _displaced(spec: WorldSpec, seen: VisibleBodies, frame: float, by: float, gaze: Gaze | None) -> Floats:
-    """(H, W, 2): where what is seen at a frame has gone `by` frames later [pixels]."""
+    """(H, W, 2): motion of the visible points from a frame to `by` frames later [pixels]."""
     now, then = (spec.pinhole(f).pose for f in (frame, frame + by))
     centre = np.asarray(spec.centre)
     y, x = np.indices(spec.shape, np.float64)

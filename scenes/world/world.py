@@ -18,8 +18,8 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from scenes.keys import check_frames
 from scenes.protocol import Gaze, Truth
 from scenes.world.cache import WorldCache
 from scenes.world.paint import paint, pieces_of
@@ -27,31 +27,34 @@ from scenes.world.plan import BLOCK, BlockPlan, blocks_of, key_frames, plan_bloc
 from scenes.world.spec import WorldSpec
 from scenes.world.sprites import TRUTH_RAYS
 from scenes.world.truth import places_at, seen_at, truth_at
-from spikecam_env.errors import InputError
 from spikecam_env.sensor import Keyframes
+from spikecam_env.types import Pictures
 
 
 @dataclass(frozen=True, eq=False)
 class World(WorldSpec):
     """Scene of rigid bodies (see `scenes.protocol.Scene`).
 
-    shape            (rows, columns)
-    bodies           their order does not matter, but for backdrops; a body's object id is its place here, from 1
-    background       radiance, or a picture of it (h, w) float32 that spans the camera's height and repeats, as
-                     far away as the sky: it moves with camera shake and gaze only
-    light            every radiance is multiplied by this
-    motion_per_key   most that anything moves in the picture between two keys of light [pixels], as far as keys
-                     at whole frames allow
-    renderer         default: chosen on first use (`scenes.renderers`)
-    cache            what is kept for the next call, and how much of it at most (`scenes.world.cache`); not an argument
-
     Truth: poses[name] is the body's (x, y, z) and its rotation as a quaternion (x, y, z, w), in the world.
-    Errors: InputError for a value out of range, by name.
 
-    >>> from scenes.meshes import assemble, sphere
-    >>> world = World((16, 24), (Body("ball", assemble(sphere(0.5))),))
-    >>> sorted(np.unique(world.truth(0.5).object_id).tolist())
-    [0, 1]
+    Args:
+        shape: (rows, columns).
+        bodies: their order does not matter, but for backdrops; a body's object id is its place here, from 1.
+        background: radiance, or a picture of it (h, w) float32 that spans the camera's height and repeats.  It is as
+            far away as the sky: it moves with camera shake and gaze only.
+        light: every radiance is multiplied by this.
+        motion_per_key: largest motion in the picture between two keys of light [pixels], as far as keys at whole frames
+            allow.
+        renderer: default: chosen on first use, in each process.
+
+    Raises:
+        InputError: a value is out of range, by name.
+
+    Example:
+        >>> from scenes.meshes import assemble, sphere
+        >>> world = World((16, 24), (Body("ball", assemble(sphere(0.5))),))
+        >>> sorted(np.unique(world.truth(0.5).object_id).tolist())
+        [0, 1]
     """
 
     cache: WorldCache = field(init=False, repr=False)
@@ -61,7 +64,7 @@ class World(WorldSpec):
         object.__setattr__(self, "cache", WorldCache.of(len(self.bodies)))
 
     def __getstate__(self) -> dict[str, Any]:
-        """Without what a process keeps for itself."""
+        """Without the cache and the renderer of the process."""
         return {f.name: getattr(self, f.name) for f in dataclasses.fields(self) if f.init} | {"renderer": None}
 
     def __setstate__(self, state: dict[str, Any]) -> None:
@@ -72,10 +75,12 @@ class World(WorldSpec):
         """Keys at whole frames that cover [start, stop]: (K,) float64, (K, H, W) float32.
 
         Without gaze they lie on the grid that each block of `plan.BLOCK` frames has from the motion in it; with gaze
-        there are keys at `start` and `stop` too.  Errors: InputError unless start < stop.
+        there are keys at `start` and `stop` too.
+
+        Raises:
+            InputError: start is not before stop.
         """
-        if not start < stop:
-            raise InputError(f"frames {start} to {stop} asked; the first must be before the second")
+        check_frames(start, stop)
         steps = {b: self.plan(b).light_step(self.motion_per_key, gaze) for b in blocks_of(start, stop)}
         frames = key_frames(steps, start, stop, with_ends=gaze is not None)
         pictures = np.empty((len(frames), *self.shape), np.float32)
@@ -90,7 +95,7 @@ class World(WorldSpec):
         """Ground truth at a frame, each body rendered at that very instant."""
         return truth_at(self, self.cache, self.plan(int(frame // BLOCK)), frame, gaze)
 
-    def picture(self, frame: float, gaze: Gaze | None = None, rays: int = TRUTH_RAYS) -> NDArray[np.float32]:
+    def picture(self, frame: float, gaze: Gaze | None = None, rays: int = TRUTH_RAYS) -> Pictures:
         """The radiance (H, W) at an instant, by rays x rays a pixel."""
         return seen_at(self, self.cache, self.plan(int(frame // BLOCK)), frame, gaze, rays).radiance
 
@@ -101,11 +106,11 @@ class World(WorldSpec):
     def lit(self, gain: float) -> World:
         """The same world with `gain` times its light."""
         other = dataclasses.replace(self, light=self.light * gain)
-        other.cache.take_motion(self.cache)
+        other.cache.update_motion(self.cache)
         return other
 
     def plan(self, block: int) -> BlockPlan:
-        """What follows from the motion in frames block * BLOCK .. (block + 1) * BLOCK."""
+        """The plan of frames block * BLOCK .. (block + 1) * BLOCK."""
 
         def made() -> BlockPlan:
             return plan_block(self, [self.cache.probe(self, body) for body in range(len(self.bodies))], block)

@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 from scenes.exposure import lit
 from scenes.planes import PlanarScene, painted_planes
 from scenes.protocol import MOST_LIGHT, Gaze, Scene
-from scenes.renderers.shared import begin_to_use, done_with
+from scenes.renderers.shared import register_user, release_user
 from spikecam_env.checked import (
     as_number,
     checked_memory,
@@ -172,7 +172,7 @@ class SpikeCameraEnv(gymnasium.Env[Any, NDArray[np.float32]]):
         model = self._checked_model(given.pop("model", self.model))
         light = checked_number(given.pop("light", 1.0), "light", 0.0, MOST_LIGHT, above=True)
         super().reset(seed=None if seed is None else checked_seed(seed))
-        begin_to_use(self)
+        register_user(self)
         self._drawn = self._checked(self._make_scene(self.np_random, given))
         self._scene = lit(self._drawn, light)
         self._load(model, int(self.np_random.integers(2**31)))
@@ -214,7 +214,7 @@ class SpikeCameraEnv(gymnasium.Env[Any, NDArray[np.float32]]):
         """
         self._sensor = self._scene = self._drawn = self._seen = self._blocks = None
         self._recent = []
-        done_with(self)
+        release_user(self)
 
     @property
     def view(self) -> CameraView:

@@ -17,8 +17,8 @@ import pytest
 import spikecam_env.envs  # noqa: F401
 from scenes.renderers import contexts, shared
 from scenes.renderers.choose import make as make_renderer
-from scenes.renderers.elsewhere import Elsewhere
 from scenes.renderers.embree import Embree
+from scenes.renderers.own_process import ProcessRenderer
 from scenes.renderers.protocol import Lighting, PictureWindow, Pinhole
 from spikecam_env.bench.renderers import objects
 from spikecam_env.errors import InputError, NotReadyError
@@ -123,7 +123,7 @@ def test_a_copy_goes_on_as_the_original_does(copied: Any) -> None:
 @pytest.mark.parametrize("kind", ["embree", "egl-software"])
 def test_a_renderer_in_another_process_draws_the_same_bits(kind: str) -> None:
     try:
-        here, there = make_renderer(kind), Elsewhere(kind)
+        here, there = make_renderer(kind), ProcessRenderer(kind)
     except InputError as error:
         pytest.skip(str(error))
     pose = np.eye(4)
@@ -144,11 +144,11 @@ def test_a_renderer_in_another_process_draws_the_same_bits(kind: str) -> None:
 
 def test_a_renderer_in_another_process_says_why_it_cannot_be_had() -> None:
     with pytest.raises(RuntimeError, match="unknown renderer 'vulkan'"):
-        Elsewhere("vulkan")
+        ProcessRenderer("vulkan")
 
 
 def test_opengl_does_not_begin_in_a_fork_of_a_process_that_has_it(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(contexts, "_begun_in", os.getpid())
-    assert contexts.may_begin()
-    monkeypatch.setattr(contexts, "_begun_in", os.getpid() + 1)
-    assert not contexts.may_begin()
+    monkeypatch.setattr(contexts, "_started_in", os.getpid())
+    assert contexts.can_start()
+    monkeypatch.setattr(contexts, "_started_in", os.getpid() + 1)
+    assert not contexts.can_start()

@@ -1,9 +1,10 @@
-"""glTF files by hand: a tree and the bytes of its tables, and what a surface shows of them."""
+"""glTF files by hand, as a tree and the bytes of its tables; mesh files as surfaces, their albedo and warnings."""
 
 from __future__ import annotations
 
 import json
 import struct
+import warnings
 from io import BytesIO
 from pathlib import Path
 from typing import Any
@@ -12,8 +13,10 @@ import numpy as np
 import trimesh
 from PIL import Image
 
+from scenes.mesh_files import from_file
 from scenes.renderers.protocol import Surface
 from scenes.renderers.view import geometry
+from scenes.transfer import linear_from_srgb
 
 COMPONENTS = {"int8": 5120, "uint8": 5121, "int16": 5122, "uint16": 5123, "uint32": 5125, "float32": 5126}
 KINDS = {1: "SCALAR", 2: "VEC2", 3: "VEC3", 4: "VEC4", 16: "MAT4"}
@@ -23,6 +26,7 @@ UPRIGHT = np.float32([[0, 1], [1, 1], [1, 0], [0, 0]])
 TWO_TRIANGLES = [0, 1, 2, 0, 2, 3]
 GREYS = np.random.default_rng(1).permutation(np.linspace(20, 250, 16).astype(np.uint8)).reshape(4, 4)
 """A picture of 4 x 4 pixels, no two of them equal."""
+LIGHT = linear_from_srgb(GREYS / np.float32(255))
 
 
 class Gltf:
@@ -48,7 +52,7 @@ class Gltf:
         return len(self.tree["bufferViews"]) - 1
 
     def table(self, values: Any, apart: int = 0, **more: Any) -> int:
-        """An accessor of (rows, columns); apart: bytes of other things between two rows."""
+        """An accessor of (rows, columns), with so many other bytes between two rows."""
         values = np.asarray(values)
         values = values.reshape(len(values), -1)
         rows = [row.tobytes() + b"\x5a" * apart for row in values]
@@ -105,6 +109,22 @@ def pictured(coordinates: Any = UPRIGHT, pixels: Any = GREYS, normalized: bool =
     at = file.table(coordinates, normalized=normalized)
     file.part(attributes={"TEXCOORD_0": at}, material=material)
     return file
+
+
+def read(path: Path, **options: object) -> Surface:
+    """The surface of a file that warns of nothing."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        return from_file(path, **options)  # type: ignore[arg-type]
+
+
+def warning_of(path: Path) -> str:
+    """The one warning, of one line, that reading a file gives."""
+    with warnings.catch_warnings(record=True) as given:
+        warnings.simplefilter("always")
+        from_file(path)
+    assert len(given) == 1 and "\n" not in str(given[0].message)
+    return str(given[0].message)
 
 
 def encoded(pixels: Any, form: str = "PNG") -> bytes:

@@ -25,8 +25,9 @@ def write_film(
 ) -> Path:
     """Pictures as arrays of codes in the pixel format `stored_as`.
 
-    ticks: time stamp of each, in units of time_base; default 0, 1, 2 ... of 1 / rate.
-    tags: color_trc, color_range, ... by their numbers in H.273.
+    Args:
+        ticks: time stamp of each, in units of time_base; default 0, 1, 2 ... of 1 / rate.
+        tags: color_trc, color_range, ... by their numbers in H.273.
     """
     with av.open(str(path), "w") as container:
         stream: Any = container.add_stream(codec, rate=rate, options=options or {})

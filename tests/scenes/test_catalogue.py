@@ -14,11 +14,6 @@ from spikecam_env.errors import InputError
 SHAPE = (60, 96)
 
 
-@pytest.fixture(scope="module")
-def renderer() -> Embree:
-    return Embree()
-
-
 def test_the_ten_scenes_of_phm_are_there() -> None:
     assert {"ball", "cook", "dice", "doll", "fan", "fly", "hand", "jump", "poker", "top"} <= set(SCENES)
     assert {"disk", "train", "car", "text", "random"} <= set(SCENES)

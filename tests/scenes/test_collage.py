@@ -7,14 +7,10 @@ import numpy as np
 import pytest
 
 from scenes.collage import LONGEST_KEY, MOTION_PER_KEY, Collage
-from scenes.protocol import Gaze, Scene
+from scenes.protocol import Gaze
 from spikecam_env.errors import InputError
 
 SHAPE = (48, 64)
-
-
-def test_it_is_a_scene():
-    assert isinstance(Collage(SHAPE, 0), Scene)
 
 
 def test_same_seed_same_light_and_another_seed_another():

@@ -4,7 +4,7 @@ import cv2
 import numpy as np
 import pytest
 
-from scenes import Gaze, RotatingDisk, Scene
+from scenes import Gaze, RotatingDisk
 from scenes.disk import disk_texture
 from spikecam_env.bench.exact_disk import supersampled
 from spikecam_env.errors import InputError
@@ -53,7 +53,7 @@ def test_light_between_keys_blends_both(texture: np.ndarray, motion: float, boun
 
 
 def test_light_of_a_frame_is_right_to_1_2_percent(disk: RotatingDisk, texture: np.ndarray) -> None:
-    """What the sensor collects over a frame, from keys, against the mean of eight instants of it."""
+    """Light that the sensor collects over a frame, from keys, against the mean of eight instants of it."""
     keys, instants = disk.radiance(40, 43), 41 + (np.arange(8) + 0.5) / 8
     given = np.mean([keys.at(t) for t in instants], axis=0)
     true = np.mean([truly(disk, texture, t) for t in instants], axis=0)
@@ -156,7 +156,7 @@ def test_disk_out_of_view_leaves_the_background() -> None:
 
 @pytest.mark.parametrize("centre", [(15.0, 10.0), (15.5, 10.0), (-3.0, 24.0), (31.0, -4.0)])
 @pytest.mark.parametrize("radius", [1.0, 4.0, 40.0])
-def test_only_what_is_within_the_rim_is_painted(centre: tuple[float, float], radius: float) -> None:
+def test_only_pixels_within_the_rim_are_painted(centre: tuple[float, float], radius: float) -> None:
     disk = RotatingDisk(
         (20, 30), radius=radius, centre=centre, background=0.0, light=(0.0, 1.0), texture=np.ones((2, 2))
     )
@@ -176,10 +176,6 @@ def test_a_brighter_disk_is_the_same_in_more_light() -> None:
     for frame, gaze in ((0, None), (7, Gaze.fixed(3.5, -2.0))):
         once, twice = (scene.truth(frame, gaze).radiance for scene in (disk, disk.lit(2.0)))
         np.testing.assert_allclose(twice, 2 * once, rtol=1e-6)
-
-
-def test_disk_is_a_scene() -> None:
-    assert isinstance(RotatingDisk(shape=(8, 8)), Scene)
 
 
 @pytest.mark.parametrize(

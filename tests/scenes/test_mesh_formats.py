@@ -1,21 +1,17 @@
-"""OBJ, MTL, PLY, STL and OFF: what trimesh reads otherwise than it is meant is read right, named, or refused."""
+"""OBJ, MTL, PLY, STL and OFF: data that trimesh misreads are read right, named, or refused."""
 
 from __future__ import annotations
 
 import struct
-import warnings
 from pathlib import Path
 
 import numpy as np
 import pytest
-from gltf_files import GREYS, encoded, seen
+from gltf_files import GREYS, LIGHT, encoded, read, seen, warning_of
 
 from scenes.mesh_files import from_file
-from scenes.renderers.protocol import Surface
-from scenes.transfer import linear_from_srgb
 from spikecam_env.errors import InputError
 
-LIGHT = linear_from_srgb(GREYS / np.float32(255))
 SQUARE = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nvt 0 0\nvt 1 0\nvt 1 1\nvt 0 1\n"
 FACES = "usemtl wood\nf 1/1 2/2 3/3\nf 1/1 3/3 4/4\n"
 TRIANGLE = "v 0 0 0\nv 1 0 0\nv 0 1 0\n"
@@ -27,21 +23,6 @@ def obj(folder: Path, text: str = f"mtllib m.mtl\n{SQUARE}{FACES}", mtl: str | N
         (folder / "m.mtl").write_text(f"newmtl wood\n{mtl}\n")
     (folder / "m.obj").write_text(text)
     return folder / "m.obj"
-
-
-def read(path: Path, **options: object) -> Surface:
-    """Without a word of warning."""
-    with warnings.catch_warnings():
-        warnings.simplefilter("error")
-        return from_file(path, **options)  # type: ignore[arg-type]
-
-
-def named(path: Path) -> str:
-    with warnings.catch_warnings(record=True) as said:
-        warnings.simplefilter("always")
-        from_file(path)
-    assert len(said) == 1
-    return str(said[0].message)
 
 
 # -- OBJ and MTL -----------------------------------------------------------------------------------------------
@@ -85,8 +66,8 @@ def test_names_of_pictures_may_have_spaces(tmp_path: Path) -> None:
         ("map_Kd -imfchan r wood.png", "the option -imfchan of a texture"),
     ],
 )
-def test_what_a_material_states_and_no_surface_shows_is_named(mtl: str, name: str, tmp_path: Path) -> None:
-    assert f"m.obj has {name}, which its surface does not show" in named(obj(tmp_path, mtl=mtl))
+def test_properties_of_a_material_that_no_surface_shows_are_named(mtl: str, name: str, tmp_path: Path) -> None:
+    assert f"m.obj has {name}, which its surface does not show" in warning_of(obj(tmp_path, mtl=mtl))
 
 
 @pytest.mark.parametrize("opaque", ["d 1.0\nTr 0", "d 1", "Tr 0", "Tr 1", "d 1\nTr 1"])
@@ -128,8 +109,8 @@ def test_tabs_and_broken_lines_are_read(tmp_path: Path) -> None:
         (f"mtllib m.mtl\n{SQUARE}usemtl wood\nf 1/1 2/2 3/99\n", "a texture without coordinates"),
     ],
 )
-def test_what_an_obj_has_and_no_surface_shows_is_named(text: str, name: str, tmp_path: Path) -> None:
-    assert f"m.obj has {name}" in named(obj(tmp_path, text, mtl="map_Kd wood.png"))
+def test_parts_of_an_obj_that_no_surface_shows_are_named(text: str, name: str, tmp_path: Path) -> None:
+    assert f"m.obj has {name}" in warning_of(obj(tmp_path, text, mtl="map_Kd wood.png"))
 
 
 @pytest.mark.parametrize("colour", ["128 0 0", "1.5 0 0", "-0.5 0 0"])
@@ -155,7 +136,7 @@ def test_properties_of_a_ply_that_are_not_read_are_named(name: str, tmp_path: Pa
         f"ply\nformat ascii 1.0\nelement vertex 3\n{head}element face 1\nproperty list uchar int vertex_indices\n"
         f"end_header\n{lines}3 0 1 2\n"
     )
-    assert f"m.ply has the property {name}, which" in named(tmp_path / "m.ply")
+    assert f"m.ply has the property {name}, which" in warning_of(tmp_path / "m.ply")
 
 
 @pytest.mark.parametrize(("stated", "said"), [(0x8000 | 31, True), (0, False)])
@@ -163,7 +144,7 @@ def test_colours_of_an_stl_are_named(stated: int, said: bool, tmp_path: Path) ->
     triangle = struct.pack("<12fH", 0, 0, 1, 0, 0, 0, 1, 0, 0, 0, 1, 0, stated)
     (tmp_path / "m.stl").write_bytes(bytes(80) + struct.pack("<I", 1) + triangle)
     if said:
-        assert "m.stl has colours of faces" in named(tmp_path / "m.stl")
+        assert "m.stl has colours of faces" in warning_of(tmp_path / "m.stl")
     else:
         read(tmp_path / "m.stl")
 
@@ -181,7 +162,7 @@ def test_colours_of_an_off_are_named(text: str, name: str | None, tmp_path: Path
     if name is None:
         read(tmp_path / "m.off")
     else:
-        assert f"m.off has {name}" in named(tmp_path / "m.off")
+        assert f"m.off has {name}" in warning_of(tmp_path / "m.off")
 
 
 def test_an_archive_is_refused(tmp_path: Path) -> None:

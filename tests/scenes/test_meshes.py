@@ -75,10 +75,6 @@ def test_a_mesh_file_and_a_picture_become_a_surface(tmp_path) -> None:
     np.testing.assert_allclose(surface.albedo, linear(128 / 255), rtol=1e-5)
 
 
-def test_srgb_code_one_half_is_linear_0_214() -> None:
-    assert float(linear(0.5)) == pytest.approx(0.2140, abs=1e-4)
-
-
 @pytest.mark.parametrize(
     ("call", "message"),
     [

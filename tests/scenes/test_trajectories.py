@@ -53,12 +53,6 @@ def test_a_throw_is_a_parabola() -> None:
     np.testing.assert_allclose(pose[:3, 3], [1 + 2, 2 + 2.5 - 1.25, 3 + 3])
 
 
-def test_2000_rpm_is_a_third_of_a_turn_in_a_hundredth_of_a_second() -> None:
-    np.testing.assert_allclose(
-        Spinning((0, 0, 1), 2000).pose(0.01)[:2, 0], [np.cos(2 * np.pi / 3), np.sin(2 * np.pi / 3)], atol=1e-12
-    )
-
-
 def test_a_bounce_falls_freely_and_repeats() -> None:
     ball = Bouncing(0.8, 9.81)
     period = 2 * np.sqrt(2 * 0.8 / 9.81)

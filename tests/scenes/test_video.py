@@ -1,8 +1,5 @@
 from __future__ import annotations
 
-from pathlib import Path
-
-import cv2
 import numpy as np
 import pytest
 
@@ -22,18 +19,6 @@ def test_light_is_linear_radiance_between_dark_and_bright() -> None:
     expected = 0.1 + 0.8 * (np.arange(4) / 5) ** 2.2
     np.testing.assert_allclose(keys.radiance.mean(axis=(1, 2)), expected, rtol=1e-3)
     assert isinstance(scene, Scene)
-
-
-def test_colour_is_luminance_of_linear_light() -> None:
-    red = np.zeros((2, 4, 4, 3), np.uint8)
-    red[..., 0] = 255
-    np.testing.assert_allclose(VideoScene(red, 1000.0, light=(0, 1)).truth(0).radiance, 0.2126, rtol=1e-3)
-
-
-def test_floats_are_light_and_gamma_1_leaves_it() -> None:
-    film = np.stack([np.full((4, 4), 0.25), np.full((4, 4), 0.75)])
-    scene = VideoScene(film, 500.0, gamma=1.0, light=(0.0, 1.0))
-    np.testing.assert_allclose(scene.truth(40.0).radiance, 0.5, rtol=1e-3)
 
 
 def test_it_plays_forth_and_back_without_end() -> None:
@@ -75,19 +60,6 @@ def test_truth_says_that_flow_is_unknown() -> None:
     truth = VideoScene(steps(), 1000.0).truth(5)
     assert np.isnan(truth.flow).all() and truth.flow.shape == (6, 8, 2)
     assert not truth.object_id.any() and truth.depth is None
-
-
-def test_a_file_reads_as_its_pictures(tmp_path: Path) -> None:
-    path = tmp_path / "film.avi"
-    writer = cv2.VideoWriter(str(path), cv2.VideoWriter.fourcc(*"MJPG"), 500.0, (32, 24))
-    for grey in (60, 120, 180):
-        writer.write(np.full((24, 32, 3), grey, np.uint8))
-    writer.release()
-    scene = VideoScene(path, light=(0.0, 1.0), transfer="gamma2.2")
-    assert scene.shape == (24, 32) and scene.frames_per_picture == 80
-    for i, grey in enumerate((60, 120, 180)):
-        np.testing.assert_allclose(scene.truth(80 * i).radiance, (grey / 255) ** 2.2, rtol=0.05)
-    assert VideoScene(path, most_pictures=2, shape=(12, 12), transfer="srgb").shape == (12, 12)
 
 
 @pytest.mark.parametrize(

@@ -14,7 +14,7 @@ from scenes.exposure import METERED_FRAMES, expose
 from scenes.flow import check_flow
 from scenes.layers import carry, project, render_key
 from scenes.meshes import assemble, box, disc, rectangle, sphere, torus
-from scenes.protocol import Gaze, Scene
+from scenes.protocol import Gaze
 from scenes.renderers.embree import Embree
 from scenes.renderers.protocol import Lighting, PictureWindow, Pinhole
 from scenes.textures import blobs, dead_leaves
@@ -24,11 +24,6 @@ from scenes.world.plan import BLOCK, pace_of
 from spikecam_env.errors import InputError
 
 SHAPE = (60, 96)
-
-
-@pytest.fixture(scope="module")
-def renderer() -> Embree:
-    return Embree()
 
 
 def busy(renderer: Embree, shake: Trajectory = AT_REST, shape: tuple[int, int] = SHAPE) -> World:
@@ -64,12 +59,8 @@ def moving(world: World, frame: float) -> np.ndarray:
     return cv2.dilate((speed > 1e-4).astype(np.uint8), np.ones((5, 5))) > 0
 
 
-def test_it_is_a_scene(renderer: Embree) -> None:
-    assert isinstance(busy(renderer), Scene)
-
-
 @pytest.mark.parametrize("shake", [AT_REST, Shake(0.2)], ids=["still camera", "shaken camera"])
-def test_keys_do_not_depend_on_the_cut_or_on_what_was_asked_before(renderer: Embree, shake: Trajectory) -> None:
+def test_keys_do_not_depend_on_the_cut_or_on_earlier_calls(renderer: Embree, shake: Trajectory) -> None:
     whole = busy(renderer, shake).radiance(BLOCK - 40, BLOCK + 40)
     light = dict(zip(whole.frame, whole.radiance, strict=True))
     again = busy(renderer, shake)
@@ -201,8 +192,8 @@ def test_light_is_scaled_to_the_wanted_mean_interval(renderer: Embree) -> None:
     assert ratio == pytest.approx(1 / (12.5 * unlit), rel=1e-4)
 
 
-def test_depth_carries_what_a_key_shows_to_its_place(renderer: Embree) -> None:
-    """In pixels and in depth, of points on the surface: to what 32-bit numbers hold."""
+def test_depth_carries_points_of_a_key_to_their_place(renderer: Embree) -> None:
+    """In pixels and in depth, of points on the surface, to the precision of 32-bit numbers."""
     surface = assemble(*box((0.8, 0.8, 0.8), [0.5] * 6))
     motion = Ballistic((0.1, 0.2, 0), (30, -20, 50)) @ Spinning((0.3, 1, 0.5), 1200)
     camera = Camera((0, 0, 3))

@@ -21,15 +21,15 @@ BODIES = 6
 
 
 class Counting:
-    """A renderer that counts what it is asked for."""
+    """A renderer that counts its pictures, by surface and pose."""
 
     name = "counting"
 
     def __init__(self) -> None:
-        self.renderer, self.asked = Embree(), Counter[Any]()
+        self.renderer, self.drawn = Embree(), Counter[Any]()
 
     def render(self, surface: Surface, pose: np.ndarray, *rest: Any) -> Sprite:
-        self.asked[surface, pose.tobytes()] += 1
+        self.drawn[surface, pose.tobytes()] += 1
         return self.renderer.render(surface, pose, *rest)
 
     def close(self) -> None:
@@ -83,9 +83,9 @@ def test_a_stream_read_in_order_renders_no_key_twice(call: int) -> None:
     assert {pace_of(world, n, world.cache.probe(world, n), 0).step for n in range(BODIES)} == {SHORTEST_KEY_STEP}
     for start in range(0, 2 * BLOCK, call):
         world.radiance(start, min(start + call, 2 * BLOCK))
-    print(f"{len(renderer.asked)} keys, rendered {max(renderer.asked.values())} time(s)")
-    assert len(renderer.asked) == BODIES * (2 * BLOCK // SHORTEST_KEY_STEP + 1)
-    assert max(renderer.asked.values()) == 1
+    print(f"{len(renderer.drawn)} keys, rendered {max(renderer.drawn.values())} time(s)")
+    assert len(renderer.drawn) == BODIES * (2 * BLOCK // SHORTEST_KEY_STEP + 1)
+    assert max(renderer.drawn.values()) == 1
     assert len(world.cache.keys) == world.cache.keys.most == 4 * BODIES + 8
 
 

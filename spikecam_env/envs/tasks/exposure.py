@@ -13,8 +13,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from scenes.derived import Derived
-from scenes.protocol import Gaze, Placed, Scene, Truth
+from scenes.protocol import Derived, Gaze, Placed, Scene, Truth
 from spikecam_env.envs.episode import Episode, Standing
 from spikecam_env.envs.tasks.base import CameraUnits
 from spikecam_env.envs.tasks.track import Track

@@ -1,4 +1,4 @@
-"""Back-ends beside each other: they agree, live and end apart, and are chosen for what works."""
+"""Back-ends beside each other: they agree, live and end apart, and one that works is chosen."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Every back-end against closed forms: what is seen where, how far, how bright."""
+"""Every back-end against closed forms: the place of points in the picture, their distance and their light."""
 
 from __future__ import annotations
 
