@@ -34,7 +34,7 @@ class PassChain:
     def __init__(
         self,
         recipe: Recipe,
-        network: nn.Module | infer.StreamPasses,
+        network: nn.Module,
         number_type: torch.dtype,
         shape: tuple[int, int],
         *,

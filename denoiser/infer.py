@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import copy
 from collections.abc import Sequence
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 import torch
@@ -19,13 +19,6 @@ from denoiser.stream_network import CARRY, MULTIPLE
 from denoiser.threads import where_torch_can
 from denoiser.window import PassWindow
 from spikecam_env.own_code import own_code
-
-
-class StreamPasses(Protocol):
-    """A network of many planes a pass: `StreamDnSS`, or the same elsewhere than in torch."""
-
-    def passed(self, seen: Tensor, beside: Tensor, hidden: Tensor, planes: Tensor | None) -> tuple[Tensor, Tensor]:
-        """As `StreamDnSS.passed`."""
 
 
 def prepared(network: nn.Module, number_type: torch.dtype) -> nn.Module:
@@ -46,14 +39,14 @@ Carried = tuple[NDArray[np.float32], ...]
 
 
 def rates(
-    network: nn.Module | StreamPasses, window: PassWindow, number_type: torch.dtype, carried: Carried = ()
+    network: nn.Module, window: PassWindow, number_type: torch.dtype, carried: Carried = ()
 ) -> tuple[NDArray[np.float32], Carried]:
     """Rates (count, H, W) float32 of the frames that the window covers, in [0, 1] [spikes/frame]; what is carried."""
     return rates_of_many(network, [window], number_type, [carried])[0]
 
 
 def rates_of_many(
-    network: nn.Module | StreamPasses,
+    network: nn.Module,
     windows: Sequence[PassWindow],
     number_type: torch.dtype,
     carried: Sequence[Carried],
@@ -103,7 +96,7 @@ def _as_in_training(
 
 
 def _side_by_side(
-    network: StreamPasses,
+    network: Any,
     windows: Sequence[PassWindow],
     number_type: torch.dtype,
     carried: Sequence[Carried],

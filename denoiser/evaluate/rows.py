@@ -34,8 +34,6 @@ from spikecam_env.untrusted import existing_file
 DECODERS: dict[str, Any] = {"held": held, "mus": mus, "accumulate": accumulate}
 CHUNK = 32
 """Frames pushed at a time."""
-BEFORE = "before"
-"""Weights to compare with: none are shipped under this name."""
 
 
 @dataclass(frozen=True)
@@ -64,7 +62,6 @@ ROWS: dict[str, Row] = {
     "best": Row("best", "best", "accumulate", True),
     "fast": Row("fast", "fast", "accumulate", True),
     "best-overlap": Row("best, passes overlapped", "best-overlap", "accumulate", True),
-    "before": Row("best, earlier weights", "before", "accumulate", True),
     "best-map": Row("best with calibration", "best-map", "accumulate", True),
     "clean": Row("clean twin", "clean"),
     "light-held": Row("true light, intervals kept", "light", "held"),
@@ -78,7 +75,6 @@ NETWORKS = {
     "fast": "fast",
     "best-overlap": "best",
     "best-map": "best",
-    "before": BEFORE,
 }
 """Weights of the sources that are denoisers."""
 PIPELINES = ("tfp41", "ssml", "spk2img-clean", "spk2img-noisy")

@@ -18,8 +18,6 @@ def report(result: dict[str, Any]) -> str:
     parts = [f"{result['title']}\n{of}"]
     for group in result["groups"]:
         parts += [_pictures(group, result["rows"], result["parameters"]), *_measures(group, result["rows"])]
-    if result["figures"]:
-        parts.append(_figures(result["figures"]))
     if result["missing"]:
         parts.append("not there:\n" + "\n".join(f"  {name}: {why}" for name, why in result["missing"].items()))
     return "\n\n".join(parts) + "\n"
@@ -80,22 +78,6 @@ def _measures(group: dict[str, Any], rows: Sequence[str]) -> list[str]:
             f"| {_number(m['mean_db'], 7, 2)} {_number(m['last_db'], 8, 2)} | {places}".rstrip()
         )
     return ["\n".join(lines)]
-
-
-def _figures(promised: Sequence[dict[str, Any]]) -> str:
-    """Those found beside those wanted, and how many could not be."""
-    words = {True: "yes", False: "NO", None: "-"}
-    found = [f for f in promised if f["found"] is not None]
-    width = max((len(f["what"]) for f in found), default=0)
-    wanted = max((len(f["wanted"]) for f in found), default=0)
-    lines = [f"{'figure':{width}} | {'wanted':{wanted}} |    found | holds | interval, speed"] if found else []
-    for f in found:
-        group = f"{f['interval']:g}, {f['speed']:g}" if f["interval"] else ""
-        lines.append(
-            f"{f['what']:{width}} | {f['wanted']:{wanted}} | {f['found']:8g} | {words[f['holds']]:5} | {group}".rstrip()
-        )
-    left = len(promised) - len(found)
-    return "\n".join([*lines, *([f"figures that need rows or columns not in this table: {left}"] if left else [])])
 
 
 def _cell(score: dict[str, float | None] | None) -> str:

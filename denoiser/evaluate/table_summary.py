@@ -84,9 +84,3 @@ def _compare(score: Mean, noisy: Mean | None, clean: Mean | None) -> None:
     score["gain_ssim"] = plain(score["ssim"] - noisy["ssim"])
     if clean is not None and clean["db"] is not None:
         score["gap_closed"] = plain(gap_closed(noisy["db"], score["db"], clean["db"]))
-
-
-def best_picture(found: dict[str, Any]) -> tuple[str, float] | None:
-    """The column under which a row's mean is highest, and that mean [dB]; its rate plane counts."""
-    known = {c: s["db"] for c, s in found["pictures"].items() if s["db"] is not None}
-    return max(known.items(), key=lambda item: item[1]) if known else None

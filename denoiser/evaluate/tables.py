@@ -24,10 +24,9 @@ from tqdm import tqdm
 
 from denoiser.evaluate import phm, real, still
 from denoiser.evaluate.exposed import CLASSICAL, StreamCase
-from denoiser.evaluate.figures import figures
 from denoiser.evaluate.judge import COLUMNS, RowResult
 from denoiser.evaluate.page import write_page
-from denoiser.evaluate.rows import BEFORE, ROWS, Weights, parameters, why_not
+from denoiser.evaluate.rows import ROWS, Weights, parameters, why_not
 from denoiser.evaluate.table_report import report
 from denoiser.evaluate.table_summary import groups
 from denoiser.evaluate.work import Results, tasks, undone, work
@@ -146,7 +145,7 @@ def _rows(table: Table, asked: TableRequest) -> list[str]:
             raise unknown_name("row", row, ROWS)
     if table.kind == "real" and (lightless := [r for r in asked.rows if ROWS[r].source in ("clean", "light")]):
         raise InputError(f"row {lightless[0]!r} needs the true light, which real recordings do not have")
-    wanted = {"noisy", *(asked.rows or table.rows), *({BEFORE} & set(asked.weights.files))}
+    wanted = {"noisy", *(asked.rows or table.rows)}
     return [row for row in ROWS if row in wanted]
 
 
@@ -238,7 +237,6 @@ def _result(
     missing: dict[str, str],
     sizes: dict[str, int | None],
 ) -> dict[str, Any]:
-    grouped = groups(records)
     return {
         "table": name,
         "title": TABLES[name].title,
@@ -253,7 +251,6 @@ def _result(
         },
         "missing": missing,
         "parameters": sizes,
-        "groups": grouped,
-        "figures": figures(name, grouped, records),
+        "groups": groups(records),
         "scenes": [record.model_dump() for record in records],
     }

@@ -1,4 +1,4 @@
-"""The tables: rows that are there, rows that are not, going on after a stop, and the figures beside the wanted ones."""
+"""The tables: rows with and without weights, and a table that goes on after a stop."""
 
 from __future__ import annotations
 
@@ -13,11 +13,10 @@ import torch
 
 from denoiser.evaluate import exposed, still, tables, work
 from denoiser.evaluate.exposed import StreamCase
-from denoiser.evaluate.figures import figures
-from denoiser.evaluate.judge import PictureScore, RowResult
+from denoiser.evaluate.judge import RowResult
 from denoiser.evaluate.rows import ROWS, Weights, why_not
 from denoiser.evaluate.table_report import report
-from denoiser.evaluate.table_summary import groups, mean_and_spread
+from denoiser.evaluate.table_summary import mean_and_spread
 from denoiser.evaluate.tables import TABLES, TableRequest, evaluate_table
 from denoiser.pixel_map import PixelMap
 from spikecam_env.datasets import build, phm_n
@@ -56,14 +55,15 @@ def test_the_multi_stage_update_of_the_true_light_is_worse_than_its_accumulation
         assert by_mus < summed
 
 
-def test_rows_without_weights_are_named_with_the_reason(tmp_path: Path) -> None:
-    """Of earlier weights none are shipped."""
-    found = evaluate_table("table3", replace(SMALL, seeds=1, rows=("before", "clean"), out=tmp_path / "out"))
+def test_rows_without_weights_are_named_with_the_reason(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    path = Weights.path
+    with monkeypatch.context() as patch:
+        patch.setattr(Weights, "path", lambda self, name: tmp_path / "fast.pt" if name == "fast" else path(self, name))
+        found = evaluate_table("table3", replace(SMALL, seeds=1, rows=("fast", "clean"), out=tmp_path / "out"))
     text = report(found)
-    assert "before.pt" in found["missing"]["before"]
-    assert "before: no weights are shipped under this name: before.pt" in text
-    line = next(line for line in text.splitlines() if line.startswith("best, earlier weights"))
-    assert set(line.removeprefix("best, earlier weights")) <= set(" -|")
+    assert "fast: no weights are shipped under this name: fast.pt" in text
+    line = next(line for line in text.splitlines() if line.startswith("fast "))
+    assert set(line.removeprefix("fast")) <= set(" -|")
     with pytest.raises(InputError, match=r"there is no file .*none\.pt"):
         evaluate_table(
             "table3", replace(SMALL, weights=Weights({"paper-no-refine": tmp_path / "none.pt"}), rows=("baseline",))
@@ -258,51 +258,6 @@ def test_the_spread_is_over_seeds_of_the_mean_over_scenes() -> None:
     )
     assert mean_and_spread([(0, 1.0)]) == (1.0, None)
     assert mean_and_spread([(0, None)]) == (None, None)
-
-
-def record(row: str, scene: str, db: dict[str, float], niqe: float | None = None, **measures: float) -> RowResult:
-    pictures = {column: PictureScore(db=level, ssim=0.5) for column, level in db.items()}
-    pictures |= {} if niqe is None else {"tfi": PictureScore(niqe=niqe)}
-    return RowResult(
-        scene=scene, seed=0, interval=10.0, speed=0.0, row=row, weights={}, pictures=pictures, **measures
-    )  # fmt: skip
-
-
-def test_the_figures_name_what_holds_and_what_does_not() -> None:
-    noisy, best, clean = {"spk2img-clean": 20.0, "tfp21": 20.0}, {"spk2img-clean": 21.0, "tfp21": 21.8}, {"tfp21": 22.0}
-    worse = best | {"spk2img-clean": 19.9}
-    records = [
-        *(record(row, "a", db) for row, db in (("noisy", noisy), ("clean", clean))),
-        record("best", "a", best, bias=-0.02, flicker=1.05, texture=0.8),
-        *(record(row, "b", db) for row, db in (("noisy", noisy), ("clean", clean), ("best", worse))),
-    ]
-    found = {f["what"]: f for f in figures("table1", groups(records), records)}
-    mean = found["best, Spk2Img, clean: mean over noisy [dB]"]
-    assert (mean["found"], mean["holds"]) == (0.45, False)
-    least = found["best, Spk2Img, clean: least over noisy of any scene [dB]"]
-    assert (least["found"], least["holds"]) == (-0.1, False)
-    gap = found["best, TFP 21: share of the gap closed"]
-    assert (gap["found"], gap["holds"]) == (0.9, True)
-    assert found["best: bias"]["holds"] is False
-    assert found["best: frame-to-frame error across passes / within"]["holds"] is True
-    assert found["best: slope of low-contrast texture"]["holds"] is True
-    assert found["best, rate planes: mean [dB]"]["holds"] is None
-    dim = [r.model_copy(update={"interval": 40.0}) for r in records]
-    assert all("over noisy (" in f["what"] or "worst" in f["what"] for f in figures("table1", groups(dim), dim))
-
-
-def test_naturalness_counts_downwards() -> None:
-    records = [
-        record(row, "a", {}, niqe=niqe) for row, niqe in (("noisy", 5.0), ("paper-held", 4.6), ("paper-mus", 4.5))
-    ]
-    found = {f["what"]: f for f in figures("table2", groups(records), records)}
-    assert (found["TFI: paper-mus over noisy [NIQE]"]["found"], found["TFI: paper-mus over noisy [NIQE]"]["holds"]) == (
-        -0.5,
-        True,
-    )
-    ablation = {f["what"]: f for f in figures("table4", groups(records), records)}
-    assert ablation["TFI: MUS over intervals kept, paper [NIQE]"]["found"] == -0.1
-    assert ablation["TFI: refine over none, mus [NIQE]"]["holds"] is None
 
 
 def test_the_calibration_of_a_still_scene_is_of_the_camera_before_it() -> None:
