@@ -47,32 +47,36 @@ where the frames that went in were tensors."""
 class OnlineDnSS:
     """A denoiser of one stream; the first `push` sets the size of its frames.
 
-    output: "spikes", "rate" (the network's plane, cut to [0, 1]) or "both".
-    stride: `paper` mode only: evaluate every stride-th plane and hold it in between (faster; worse when things move).
-    precision: of the network; "auto" is bfloat16 where the processor (the GPU, with `device`) has it, else float32.
-    engine: what computes the network, "torch", or "openvino" (an optional package; `best` mode only).  Each gives the
-        same bits for any cutting of the stream; in bfloat16 their rates differ by some 4e-4 rms [spikes/frame].
-        "captured" is "torch", and on a CUDA `device` a pass is recorded once and replayed.
-    device: `best` mode only: windows, planes and network as tensors there, "cuda", "cuda:1" or "cpu"
-        (`denoiser.on_device`).  In float32 rates differ by less than 1e-5 from those without.  Spikes, and the mean of
-        `overlap`, are made of them on the host.  Default: windows on the processor, in compiled code.
-    decoder: how rates become spikes, "accumulate" (`denoiser.accumulate`) or "mus" (`denoiser.mus`, the paper's);
-        default: the recipe's.
-    unit: `best` mode only: the calibrated unit: maps (gain, dark) of shape (H, W), a `Calibration` of SNEE, the path of
-        its maps.h5, or a `PixelMap`.
-    overlap: `best` mode only: two chains of passes, half a pass apart, and their mean (`denoiser.chain`): less error,
-        no seams, twice the work.
-    network: of the recipe.  A module of another class that takes and gives the same, as `torch.compile(network)`, is
-        called as it is in training; a pass then takes longer by what `spikecam bench loop` prints.
-    The network is copied: training it further changes nothing here.  One object denoises one stream: for another stream
-    take `another()`.
-    Errors: InputError for unknown options, a network of another recipe or without finite weights, and unusable spikes;
-    NotReadyError for a push after `flush`.
+    The network is copied: training it further changes nothing here.  For another stream take `another()`.
 
-    >>> online = OnlineDnSS.pretrained("best", output="rate")
-    >>> spikes = (np.random.default_rng(0).random((64, 16, 24)) < 0.2).astype(np.uint8)
-    >>> [online.push(block).shape for block in (spikes[:32], spikes[32:])], online.flush().shape
-    ([(16, 16, 24), (32, 16, 24)], (16, 16, 24))
+    Args:
+        recipe: of the network.
+        network: of the recipe.  A module of another class that takes and gives the same, as `torch.compile(network)`,
+            is called as in training; `spikecam bench loop` prints by how much a pass is then slower.
+        output: "spikes", "rate" (the network's plane, cut to [0, 1]) or "both".
+        stride: `paper` mode only: evaluate every stride-th plane and hold it in between (faster; worse when things
+            move).
+        precision: of the network; "auto" is bfloat16 where the processor (the GPU, with `device`) has it, else float32.
+        engine: "torch", or "captured", with a `device`: on CUDA a pass is then recorded once and replayed.
+        decoder: from rates to spikes, "accumulate" (`denoiser.accumulate`) or "mus" (`denoiser.mus`, the paper's);
+            default: the recipe's.
+        unit: `best` mode only: the calibrated unit: maps (gain, dark) of shape (H, W), a `Calibration` of SNEE, the
+            path of its maps.h5, or a `PixelMap`.
+        overlap: `best` mode only: two chains of passes, half a pass apart, and their mean (`denoiser.chain`): less
+            error, no seams, twice the work.
+        device: `best` mode only: windows, planes and network as tensors there, "cuda", "cuda:1" or "cpu"
+            (`denoiser.on_device`).  In float32 rates differ by less than 1e-5 from those without.  Spikes, and the mean
+            of `overlap`, are made of them on the host.  Default: windows on the processor, in compiled code.
+
+    Raises:
+        InputError: unknown options, a network of another recipe or without finite weights, and unusable spikes.
+        NotReadyError: a push after `flush`.
+
+    Example:
+        >>> online = OnlineDnSS.pretrained("best", output="rate")
+        >>> spikes = (np.random.default_rng(0).random((64, 16, 24)) < 0.2).astype(np.uint8)
+        >>> [online.push(block).shape for block in (spikes[:32], spikes[32:])], online.flush().shape
+        ([(16, 16, 24), (32, 16, 24)], (16, 16, 24))
     """
 
     def __init__(
@@ -133,10 +137,8 @@ class OnlineDnSS:
         return cls(recipe, network, **options)
 
     def another(self, output: str | None = None) -> OnlineDnSS:
-        """A denoiser like this one for another stream, from its first frame; both use the same weights.
-
-        output: of the other, default this one's.
-        """
+        """A denoiser like this one for another stream, from its first frame, with the same weights; by default the same
+        output."""
         other = copy.copy(self)
         other.output = self.output if output is None else _checked_output(output)
         other.reset()
@@ -149,7 +151,7 @@ class OnlineDnSS:
 
     @property
     def latency(self) -> int:
-        """Frames between a frame's going in and its coming out, at most."""
+        """Frames between a frame's arrival and its output, at most."""
         return self._recipe.layout.latency
 
     @property
@@ -171,12 +173,19 @@ class OnlineDnSS:
         return self._device
 
     def push(self, spikes: ArrayLike | torch.Tensor) -> Denoised:
-        """(K, H, W) more spike frames, 0 or 1, K >= 0 -> the frames they complete (perhaps none)."""
+        """(K, H, W) more spike frames, 0 or 1, K >= 0 -> the frames that they complete (perhaps none)."""
         return self._pushed(spikes, as_tensors=isinstance(spikes, torch.Tensor))
 
     def push_packed(self, packed: NDArray[np.uint8] | torch.Tensor, shape: tuple[int, int]) -> Denoised:
-        """`push` of (K, ceil(H W / 8)) packed frames of `shape`, as `pack_frames` packs; to a device they go as they
-        are, and are unpacked there.  What comes out is an array where `packed` is one."""
+        """`push` of packed frames.  To a device they go as they are, and are unpacked there.
+
+        Args:
+            packed: (K, ceil(H W / 8)) as `pack_frames` packs.
+            shape: (H, W).
+
+        Returns:
+            As `push`; arrays where `packed` is an array.
+        """
         if self._device is None:
             return self.push(unpack_frames(np.asarray(packed), shape))
         return self._pushed(unpacked_on(packed, shape, self._device), as_tensors=isinstance(packed, torch.Tensor))
@@ -191,14 +200,14 @@ class OnlineDnSS:
         return self._denoise([chain.push(chunk) for chain in self._chains])
 
     def flush(self) -> Denoised:
-        """The stream is over -> its last frames, so that as many came out as went in."""
+        """End the stream -> its last frames, so that output and input have as many."""
         if not self._chains:
             raise NotReadyError("nothing was pushed yet; push spike frames first")
         self._ended = True
         return self._denoise([chain.end() for chain in self._chains])
 
     def state(self) -> dict[str, Any]:
-        """A copy of everything later frames depend on, but the weights: plain arrays and numbers, picklable."""
+        """A copy of everything on which later frames depend, but the weights: plain arrays and numbers, picklable."""
         state: dict[str, Any] = {"of": self._identity(), "shape": self.shape}
         if self._chains:
             state |= {
@@ -212,8 +221,12 @@ class OnlineDnSS:
     def restore(self, state: dict[str, Any]) -> None:
         """Go on from a copy of `state()`; the output may be another one.
 
-        Raises InputError for the state of a denoiser with other weights, recipe, stride, precision or engine, which
-        would go on differently, and for anything that is no state; this one is then as it was.
+        Args:
+            state: of a denoiser with the same weights and options.
+
+        Raises:
+            InputError: the state is of other weights, recipe, stride, precision or engine, which would go on
+                differently, or is no state.  This denoiser is then as it was.
         """
         try:
             for name, ours in self._identity().items():
@@ -229,13 +242,13 @@ class OnlineDnSS:
         except (KeyError, TypeError, AttributeError, IndexError, ValueError) as error:
             raise InputError(
                 f"the state is no whole state of a denoiser ({type(error).__name__}: {error}); "
-                "give what `OnlineDnSS.state()` returned"
+                "give the result of `OnlineDnSS.state()`"
             ) from error
         self._chains, self._mixing = other._chains, other._mixing
         self._decoding, self._ended = other._decoding, other._ended
 
     def chain(self, shape: tuple[int, int], first: int = 0) -> PassChain:
-        """Passes of this network over another stream, from its frame `first` on: for those who denoise many."""
+        """Passes of this network over another stream from frame `first` on, for a caller that denoises many."""
         self._check_map(shape)
         options: dict[str, Any] = {"unit": self._unit, "stride": self._stride, "first": first}
         return PassChain(self._recipe, self._network, self._type, shape, **options)
@@ -252,7 +265,7 @@ class OnlineDnSS:
             raise InputError(f"the calibration map has shape {self._unit.gain.shape}, the stream's frames {shape}")
 
     def passes(self, windows: list[PassWindow], carried: list[infer.Carried]) -> list[tuple[Rates, infer.Carried]]:
-        """Rates of the windows of as many streams, and what each leaves, in one pass of the network."""
+        """Rates of the windows of as many streams, and the carried arrays of each, in one pass of the network."""
         return infer.rates_of_many(self._network, windows, self._type, carried)
 
     def _begin(self, shape: tuple[int, int]) -> None:
@@ -276,7 +289,7 @@ class OnlineDnSS:
         self._ended = bool(state["ended"])
 
     def _identity(self) -> dict[str, Any]:
-        """What frames depend on besides the stream."""
+        """The options and weights on which frames depend besides the stream."""
         precision = "bfloat16" if self._type == torch.bfloat16 else "float32"
         return {
             "recipe and weights": self._digest,
@@ -351,15 +364,25 @@ def _checked_output(output: str) -> str:
 
 
 def denoise(spikes: ArrayLike, mode: str = "best", *, chunk: int = 256, **options: Any) -> Denoised:
-    """(T, H, W) recorded spikes -> as many denoised frames; options as for `OnlineDnSS`.
+    """Denoise a recording.  The bits are those of the stream pushed piece by piece.
 
-    The same bits as pushing the stream piece by piece; it is pushed `chunk` frames at a time to save memory.
-    Raises InputError as `OnlineDnSS` does, and for a chunk that is no whole number, 1 or more.
+    Args:
+        spikes: (T, H, W) recorded.
+        mode: "best", "fast" or "paper".
+        chunk: frames that are pushed at a time, to save memory.
+        options: as for `OnlineDnSS`.
 
-    >>> spikes = (np.random.default_rng(0).random((48, 16, 24)) < 0.2).astype(np.uint8)
-    >>> rate = denoise(spikes, "best", output="rate")
-    >>> rate.shape, rate.dtype
-    ((48, 16, 24), dtype('float32'))
+    Returns:
+        T denoised frames.
+
+    Raises:
+        InputError: as `OnlineDnSS`; and for a chunk that is no whole number, 1 or more.
+
+    Example:
+        >>> spikes = (np.random.default_rng(0).random((48, 16, 24)) < 0.2).astype(np.uint8)
+        >>> rate = denoise(spikes, "best", output="rate")
+        >>> rate.shape, rate.dtype
+        ((48, 16, 24), dtype('float32'))
     """
     frames, chunk = as_spikes(spikes), checked_count(chunk, "chunk")
     online = OnlineDnSS.pretrained(mode, **options)

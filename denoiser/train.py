@@ -43,9 +43,9 @@ from spikecam_env.torch_settings import torch_settings
 VALIDATION_SEED = 1_000_003  # added to the seed: other scenes, other units, other textures of the same kinds
 VALIDATION_STREAMS = 8
 NARROWING_PASSES = 16
-"""Passes of so many streams on which the channels of a larger network are looked at, where a smaller one begins."""
+"""Passes of VALIDATION_STREAMS streams from which the channels of a larger network are chosen for a smaller one."""
 PASSES = {"light": 3, "clean_inverse_interval": 1}
-"""Passes of each stream that a step takes, by what the network learns."""
+"""Passes of each stream in a step, by the network's target."""
 
 _COUNTS = {
     "steps": (1, 10**9),
@@ -64,40 +64,44 @@ _AMOUNTS = {"lr": 1.0, "minutes": 1e6, "save_every_s": 1e9}
 
 @dataclass(frozen=True)
 class TrainConfig:
-    """mode: "best" | "fast" | "paper".  out: folder.  The run ends after `steps`, or `minutes` where that is given.
-
-    batch: streams a step.  patch: their side [pixels], a multiple of 16.  lr: highest rate of learning.
-    validate_every: steps between validations.  validate_passes: passes of each validation along its streams.
-    threads: of the processor.  device: where streams and network are; a GPU wants larger batches.
-    refine: `paper` with its refine module or, for the ablation, without.
-    channels: of `best` and `fast`, as `stream_network.StreamDnSS` has them: fewer are faster, and less accurate.  None:
-    the mode's.
-    start: weights of the same mode to begin from, a file of this training or a mode's name for those that ship; of a
-    network with more channels, or with the refine module, what matters most (`smaller`).
-    resume: go on from out/last.pt.
-    teacher: not of `paper`, weights whose rates the network is to learn, a file or "best", instead of the light.
-    compiled: the simulated light by `torch.compile`, on a processor too; a GPU always does.
-    """
+    """Options of a training; the run ends after `steps`, or `minutes` where that is given."""
 
     mode: str = "best"
+    """"best", "fast" or "paper"."""
     out: Path = Path("training")
+    """Folder."""
     steps: int = 20_000
     batch: int = 16
+    """Streams a step."""
     seed: int = 0
     threads: int = 1
+    """Of the processor."""
     resume: bool = True
+    """Go on from out/last.pt."""
     minutes: float | None = None
     patch: int = 64
+    """Side of the streams [pixels], a multiple of 16."""
     lr: float = 1e-3
+    """Highest rate of learning."""
     refine: bool = True
+    """`paper` with its refine module or, for the ablation, without."""
     channels: tuple[int, int, int] | None = None
+    """Of `best` and `fast`, as `stream_network.StreamDnSS` has them: fewer are faster, and less accurate.  None: the
+    mode's."""
     save_every_s: float = 60.0
     validate_every: int = 1000
+    """Steps between validations."""
     validate_passes: int = 24
+    """Passes of each validation along its streams."""
     device: str = "cpu"
+    """Of streams and network; a GPU wants larger batches."""
     start: str | None = None
+    """Weights of the same mode to begin from: a file of this training, or a mode's name for those that ship.  A network
+    with more channels, or with the refine module, is made smaller (`smaller`)."""
     teacher: str | None = None
+    """Not of `paper`: weights whose rates the network is to learn instead of the light, a file or "best"."""
     compiled: bool = False
+    """The simulated light by `torch.compile`, on a processor too; a GPU always does."""
 
     def __post_init__(self) -> None:
         recipe_of(self.mode)
@@ -135,8 +139,13 @@ class TrainConfig:
 def train(config: TrainConfig, *, progress: bool = True) -> Path:
     """Train, or go on training; returns the path of the weights.
 
-    Raises InputError where another run is at work in `out`, or it holds the run of another mode, or a damaged one, and
-    where `start` is of another network.
+    Args:
+        config: options.
+        progress: shows a bar.
+
+    Raises:
+        InputError: another run is at work in `out`; it holds the run of another mode, or a damaged one; `start` is of
+            another network.
     """
     with run_folder(config.out, "a run of training"), torch_settings(config.threads, config.seed):
         return _trained(config, progress)
@@ -179,7 +188,7 @@ def _trained(config: TrainConfig, progress: bool) -> Path:
 
 
 class TrainingSource(Protocol):
-    """What a network learns from and is judged by."""
+    """Streams from which a network learns, and by which it is judged."""
 
     streams: SimulatedStreams
 
@@ -187,7 +196,7 @@ class TrainingSource(Protocol):
         """The loss of one step, with gradients."""
 
     def errors(self, network: nn.Module, passes: int) -> dict[str, float]:
-        """Mean squared errors against the light, by what guessed it."""
+        """Mean squared errors of every guess against the light."""
 
 
 def source(recipe: Recipe, *, seed: int, **options: Any) -> TrainingSource:
@@ -197,7 +206,7 @@ def source(recipe: Recipe, *, seed: int, **options: Any) -> TrainingSource:
 
 
 def stepper(run: Run, streams: TrainingSource, passes: int) -> Callable[[], Tensor]:
-    """A function that takes one step and returns its loss, which a GPU need not have worked out yet."""
+    """A function that takes one step and returns its loss, which a GPU may still be computing."""
 
     def step() -> Tensor:
         run.optimiser.zero_grad(set_to_none=True)
@@ -218,7 +227,7 @@ class Validator:
         self._bank = Bank.drawn(seed, device, textures=32, units=16)
 
     def scores(self, network: nn.Module) -> dict[str, float]:
-        """PSNR against light 1.0 [dB] of the network and what it is compared with, each along whole streams."""
+        """PSNR against light 1.0 [dB] of the network and of simpler guesses, each along whole streams."""
         network.eval()
         streams = source(
             self._recipe,
@@ -235,10 +244,16 @@ class Validator:
 
 
 def started(recipe: Recipe, start: str, seed: int, patch: int = 64) -> nn.Module:
-    """The network of a file, or of the weights that ship under this name, ready to learn further.
+    """A trained network, ready to learn further.  Of a larger network a smaller one is made (`smaller`).
 
-    Of a larger network a smaller one is made (`smaller`), on streams of this seed and side [pixels].  Raises InputError
-    where the recipe is of another kind, or the larger one.
+    Args:
+        recipe: of the network to train.
+        start: a file of weights, or the name of weights that ship.
+        seed: of the streams from which the smaller network is made.
+        patch: their side [pixels].
+
+    Raises:
+        InputError: the weights are of another kind of network, or of a smaller one.
     """
     found, network, _ = load_weights(start)
     alike = replace(found, decoder=recipe.decoder, channels=recipe.channels, refine=recipe.refine) == recipe
@@ -256,7 +271,7 @@ def started(recipe: Recipe, start: str, seed: int, patch: int = 64) -> nn.Module
 
 
 def _teacher(recipe: Recipe, teacher: str) -> nn.Module:
-    """Raises InputError for a network of other windows."""
+    """InputError for a network of other windows."""
     found, network, _ = load_weights(teacher)
     if found.layout != recipe.layout:
         raise InputError(f"teacher is {teacher!r}, weights of another mode; give a file of this mode")

@@ -1,4 +1,4 @@
-"""What a file of weights says of its training: the command, its options, how far it came."""
+"""The record of a training in its file of weights: the command, its options, how far it came."""
 
 from __future__ import annotations
 

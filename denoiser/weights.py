@@ -1,4 +1,4 @@
-"""Checkpoints: trained networks as small files that say what they are and how they were made.
+"""Checkpoints: trained networks as small files, with their recipe and the record of their training.
 
 A file is `torch.save` of plain values: format, mode, recipe, state_dict, training (command, seed, steps, minutes,
 package version) and sha256, the digest of recipe and weights.  A foreign file cannot run code (`denoiser.plain_torch`).
@@ -33,7 +33,7 @@ class Described(Protocol):
     """A recipe of any kind of network."""
 
     def to_dict(self) -> dict[str, Any]:
-        """Plain values that say what the network is."""
+        """The recipe as plain values."""
 
 
 def save_weights(
@@ -46,16 +46,23 @@ def save_weights(
 
 
 def load_weights(path: str | os.PathLike[str]) -> tuple[Recipe, nn.Module, dict[str, Any]]:
-    """Read a checkpoint, or the weights of a mode that ship: (recipe, network in evaluation mode, training record).
+    """Read a checkpoint, or the weights of a mode that ship.  Warns where it has no digest.
 
-    Warns where it has no digest.  Raises InputError for a missing or damaged file, a file of another kind, weights of
-    another network, and weights that are not finite or not those of the digest.
+    Args:
+        path: of the file, or the name of a mode.
+
+    Returns:
+        Recipe, network in evaluation mode, training record.
+
+    Raises:
+        InputError: a missing or damaged file, a file of another kind, weights of another network, and weights that are
+            not finite or not those of the digest.
     """
     return where_torch_can(lambda: _load(weights_path(path)))
 
 
 def digest(recipe: Described, weights: Mapping[str, Tensor]) -> str:
-    """SHA-256 of what a network computes with: its recipe, and its weights by name."""
+    """SHA-256 of a recipe, and of weights by name."""
     found = hashlib.sha256(json.dumps(recipe.to_dict(), sort_keys=True).encode())
     for name in sorted(weights):
         tensor = weights[name].detach().cpu().contiguous()
@@ -72,11 +79,8 @@ def pretrained_path(mode: str) -> Path:
 
 
 def weights_path(weights: Any) -> Path:
-    """Where weights are that are given by path, or by the name of the mode that ships them.
-
-    Raises:
-        InputError: it is neither, a network for one.
-    """
+    """Path of weights that are given by path or by the name of a mode; InputError for another object, a network for
+    one."""
     if isinstance(weights, str) and weights in RECIPES:
         return pretrained_path(weights)
     if not isinstance(weights, str | os.PathLike):
@@ -95,7 +99,7 @@ def write_whole(path: str | os.PathLike[str], data: Any) -> None:
 
 
 def seal(path: str | os.PathLike[str]) -> None:
-    """Add the digest to a checkpoint without one; nothing else changes.  Raises InputError as `load_weights`."""
+    """Add the digest to a checkpoint without one; nothing else changes.  InputError as `load_weights`."""
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", UserWarning)
         recipe, _, _ = load_weights(path)

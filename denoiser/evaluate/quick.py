@@ -2,17 +2,16 @@
 
 Held out: photographs (scikit-image's) and the texture kinds that training never sees, other seeds, SCSim's preset,
 speeds and light levels in a grid.  Pictures (TFP 21, TFP 41, TFI) are taken at least 100 frames after the start, where
-noisy and clean twins have long forgotten their common phase.  Two truths are asked: the light at the middle frame, and
+noisy and clean twins have long forgotten their common phase.  There are two truths: the light at the middle frame, and
 the clean twin's picture.  PSNR and SSIM count from the scene's brightest light.
 
-"well lit, moving" is what the method is for (the paper's sets are high-speed scenes in good light); still and dim
-scenes are listed apart.  In a still scene fixed pattern and texture look alike: only knowledge of pictures helps.
+The method is for "well lit, moving" (the paper's sets are high-speed scenes in good light); still and dim scenes are
+listed apart.  In a still scene fixed pattern and texture look alike: only knowledge of pictures helps.
 
 Rows: noisy; two for each mode, its spikes and its rate planes; clean (the noise-free twin); oracle (the true light
-through `denoiser.accumulate`).
-The oracle is what a perfect network would score: against the light it is the clean stream's equal; against the clean
-twin's picture it is a bound on any stream of spikes, for two streams of one light differ by their quantisation
-(`metrics.count_variance`); rates are not quantised and may come half that (3 dB) nearer.
+through `denoiser.accumulate`).  The oracle has the score of a perfect network: against the light it is the clean
+stream's equal.  Against the clean twin's picture it bounds any stream of spikes, for two streams of one light differ by
+their quantisation (`metrics.count_variance`).  Rates are not quantised and may come half that (3 dB) nearer.
 """
 
 from __future__ import annotations
@@ -76,10 +75,19 @@ def evaluate_quick(
 ) -> dict[str, Any]:
     """Evaluate on the held-out grid: static, slow, fast x bright, middle, dim.
 
-    weights: checkpoint by mode, instead of the shipped ones.  model: of the cameras, default the preset `scsim`.
-    out: a folder for `evaluate.json` and `evaluate.txt`.
-    Returns group (`GROUPS`) -> row -> picture -> {light_db, light_ssim, clean_db, clean_ssim, gap_closed}, and
-    "settings" (with the mean interval [frames] of each light level).
+    Args:
+        modes: denoisers to judge.
+        weights: checkpoint by mode, instead of the shipped ones.
+        scenes_a_class: of each speed and light.
+        shape: (rows, columns).
+        frames: of each stream.
+        seed: of scenes and cameras.
+        model: of the cameras, default the preset `scsim`.
+        out: a folder for `evaluate.json` and `evaluate.txt`.
+
+    Returns:
+        Group (`GROUPS`) -> row -> picture -> {light_db, light_ssim, clean_db, clean_ssim, gap_closed}, and "settings"
+        (with the mean interval [frames] of each light level).
     """
     denoisers = {m: _denoiser(m, (weights or {}).get(m)) for m in modes}
     scores: list[dict[str, Any]] = []
@@ -110,10 +118,7 @@ def evaluate_quick(
 def held_out(
     scenes_a_class: int, shape: tuple[int, int], frames: int, seed: int, model: SensorModel | None = None
 ) -> Iterator[HeldOut]:
-    """The held-out scenes, exposed; textures, motions, camera units and noise follow from the seed.
-
-    model: of the cameras, default the preset `scsim`.
-    """
+    """The held-out scenes, exposed; textures, motions, camera units and noise follow from the seed."""
     camera = SensorModel.preset("scsim") if model is None else model
     textures = held_out_textures(seed)
     for i, (speed, light) in enumerate((s, b) for s in SPEEDS for b in LIGHTS):

@@ -30,7 +30,7 @@ def _of(settings: dict[str, Any]) -> str:
 
 
 def _repeated(counted: dict[str, Any]) -> str:
-    """What the spreads are over."""
+    """The repetitions over which the spreads are."""
     return f"{counted['seeds']} instants" if counted["seeds_are_instants"] else f"seeds: {counted['seeds']}"
 
 

@@ -16,8 +16,12 @@ Mean = dict[str, float | None]
 def groups(records: Sequence[RowResult]) -> list[dict[str, Any]]:
     """Records by mean interval and speed, each with the means of its rows.
 
-    A group: interval, speed, scenes, seeds, and rows: row -> {pictures: column -> {db, db_spread, ssim, ssim_spread,
-    niqe, gain_db, gain_ssim, gap_closed}, and the other measures of a `RowResult`, by name}.
+    Args:
+        records: of many scenes and seeds.
+
+    Returns:
+        Groups: interval, speed, scenes, seeds, and rows: row -> {pictures: column -> {db, db_spread, ssim, ssim_spread,
+            niqe, gain_db, gain_ssim, gap_closed}, and the other measures of a `RowResult`, by name}.
     """
     kinds = dict.fromkeys((r.interval, r.speed) for r in records)
     return [_group(*kind, [r for r in records if (r.interval, r.speed) == kind]) for kind in kinds]
@@ -77,7 +81,7 @@ def _by_place(records: list[RowResult]) -> list[float | None]:
 
 
 def _compare(score: Mean, noisy: Mean | None, clean: Mean | None) -> None:
-    """Add what the row gains over noisy, and the share of the way to the clean twin."""
+    """Add the row's gain over noisy, and the share of the way to the clean twin."""
     if noisy is None or score["db"] is None or noisy["db"] is None or score["ssim"] is None or noisy["ssim"] is None:
         return
     score["gain_db"] = plain(score["db"] - noisy["db"])

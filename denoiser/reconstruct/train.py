@@ -1,8 +1,8 @@
 """Training a reconstructor on simulated streams as they go on, resumable at any minute.
 
-Each step moves every stream on by `frames_a_step` frames and learns from the window that ends there
-(`rolling.py`), by the loss of `lessons.py`, in the loop that all training shares (`denoiser.training_loop`).  A resumed
-run goes on with new streams.
+Each step moves every stream on by `frames_a_step` frames and learns from the window that ends there (`rolling.py`), by
+the loss of `lessons.py`.  The loop is that of all training (`denoiser.training_loop`).  A resumed run goes on with new
+streams.
 
 In `out` the run keeps `<mode>.pt` (weights), `last.pt` (to resume), `curve.json` and `curve.png`: validation on streams
 of another seed, against the true light, beside TFP 21, TFP 41 and TFI of the same windows.
@@ -60,31 +60,35 @@ _AMOUNTS = {"lr": 1.0, "minutes": 1e6, "save_every_s": 1e9}
 
 @dataclass(frozen=True)
 class ReconstructorConfig:
-    """mode: "spk2img-clean" | "spk2img-noisy" | "ssml".  out: folder.
-
-    The run ends after `steps`, or `minutes` where that is given.  width: channels; None: the recipe's.
-    batch: streams, each a window a step.  patch: their side [pixels].  frames_a_step: by which they go on.
-    lr: highest rate of learning.  validate_every: steps.  threads, device: of network and streams.
-    resume: go on from out/last.pt.
-    compiled: the simulated light by `torch.compile`, on a processor too; a GPU always does.
-    """
+    """Options of a training; the run ends after `steps`, or `minutes` where that is given."""
 
     mode: str = "spk2img-noisy"
+    """"spk2img-clean", "spk2img-noisy" or "ssml"."""
     out: Path = Path("training")
+    """Folder."""
     steps: int = 20_000
     batch: int = 64
+    """Streams, each a window a step."""
     seed: int = 0
     threads: int = 1
     resume: bool = True
+    """Go on from out/last.pt."""
     minutes: float | None = None
     patch: int = 64
+    """Side of the streams [pixels]."""
     lr: float = 1e-3
+    """Highest rate of learning."""
     save_every_s: float = 60.0
     validate_every: int = 500
+    """Steps between validations."""
     device: str = "cpu"
+    """Of network and streams."""
     width: int | None = None
+    """Channels; None: the recipe's."""
     frames_a_step: int = 12
+    """By which the streams go on."""
     compiled: bool = False
+    """The simulated light by `torch.compile`, on a processor too; a GPU always does."""
 
     def __post_init__(self) -> None:
         self.recipe()
@@ -105,16 +109,21 @@ class ReconstructorConfig:
             checked_compiler(self.device)
 
     def recipe(self) -> ReconstructorRecipe:
-        """What is trained; raises InputError for an unknown mode or width."""
+        """The recipe to train; InputError for an unknown mode or width."""
         return reconstructor_recipe(self.mode, self.width)
 
 
 def train_reconstructor(config: ReconstructorConfig, *, progress: bool = True) -> Path:
     """Train, or go on training; returns the path of the weights.
 
-    `minutes` counts from here, the drawing of textures and compilation included.
-    Raises InputError where another run is at work in `out`, or it holds the run of another mode or width, or a damaged
-    one.
+    `minutes` counts from here, with the drawing of textures and compilation.
+
+    Args:
+        config: options.
+        progress: shows a bar.
+
+    Raises:
+        InputError: another run is at work in `out`, or it holds the run of another mode or width, or a damaged one.
     """
     with run_folder(config.out, "a run of training"), torch_settings(config.threads, config.seed):
         return _trained(config, progress)
@@ -142,7 +151,7 @@ def _trained(config: ReconstructorConfig, progress: bool) -> Path:
 
 
 def _step(config: ReconstructorConfig, lesson: Lesson, run: Run, rolling: RollingWindows) -> Tensor:
-    """One step; its loss, which a GPU need not have worked out yet."""
+    """One step; its loss, which a GPU may still be computing."""
     run.optimiser.zero_grad(set_to_none=True)
     windows = rolling.advance(config.frames_a_step)
     kind = number_type("auto", windows.spikes.device)

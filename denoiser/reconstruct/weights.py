@@ -33,10 +33,17 @@ def save_reconstructor(
 
 
 def load_reconstructor(path: str | os.PathLike[str]) -> tuple[ReconstructorRecipe, nn.Module, dict[str, Any]]:
-    """Read a checkpoint: (recipe, network in evaluation mode with float32 weights, training record).
+    """Read a checkpoint.
 
-    Raises InputError for a missing or damaged file, a file of another kind, weights of another network, and weights
-    that are not finite or not those of the digest.
+    Args:
+        path: of the file.
+
+    Returns:
+        Recipe, network in evaluation mode with float32 weights, training record.
+
+    Raises:
+        InputError: a missing or damaged file, a file of another kind, weights of another network, and weights that are
+            not finite or not those of the digest.
     """
     return where_torch_can(lambda: _load(path))
 
