@@ -206,6 +206,6 @@ def _set_inputs_first(weights: Weights, name: str, value: Tensor) -> None:
 
 
 def _bias(weights: Weights, name: str, mine: Tensor, constant: Tensor) -> Tensor:
-    """The effect of constant channels (C,) on the outputs; of `up`, whose outputs see one input each, a mean of four."""
+    """The effect of constant channels (C,) on the outputs; a mean of four for `up`, whose outputs see one input."""
     over = mine.mean(dim=(2, 3)) if name == "up" else mine.sum(dim=(2, 3))
     return constant @ over

@@ -13,7 +13,6 @@ In `out` the run keeps `<mode>.pt` (weights), `last.pt` (to resume), `curve.json
 from __future__ import annotations
 
 import math
-import os
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, replace
@@ -23,7 +22,7 @@ from typing import Any, Protocol
 import torch
 from torch import Tensor, nn
 
-from denoiser.captured import captured, checked_compiler
+from denoiser.captured import captured
 from denoiser.interval_training import IntervalWindows
 from denoiser.network import DnSS
 from denoiser.recipe import Recipe, checked_channels, recipe_of
@@ -33,11 +32,11 @@ from denoiser.simulated import Bank, SimulatedStreams
 from denoiser.smaller import narrowed, without_refine
 from denoiser.stream_network import StreamDnSS
 from denoiser.training_loop import RUN_FILE, learn, save_progress
+from denoiser.training_options import check_options
 from denoiser.training_record import training_record
 from denoiser.weights import load_weights, save_weights
 from spikecam_env.errors import InputError
 from spikecam_env.run_folder import run_folder
-from spikecam_env.sensor.kernels.cuda import checked_device
 from spikecam_env.torch_settings import torch_settings
 
 VALIDATION_SEED = 1_000_003  # added to the seed: other scenes, other units, other textures of the same kinds
@@ -57,9 +56,6 @@ _COUNTS = {
     "validate_passes": (1, 10**6),
 }
 """Options that are whole numbers, with the least and the most."""
-
-_AMOUNTS = {"lr": 1.0, "minutes": 1e6, "save_every_s": 1e9}
-"""Options that are numbers above 0, with the most."""
 
 
 @dataclass(frozen=True)
@@ -105,29 +101,11 @@ class TrainConfig:
 
     def __post_init__(self) -> None:
         recipe_of(self.mode)
-        for name, (least, most) in _COUNTS.items():
-            value = getattr(self, name)
-            if not isinstance(value, int) or isinstance(value, bool) or not least <= value <= most:
-                raise InputError(f"{name} is {value!r}; it must be a whole number from {least} to {most}")
-        for name, highest in _AMOUNTS.items():
-            amount = getattr(self, name)
-            if name == "minutes" and amount is None:
-                continue
-            if not isinstance(amount, int | float) or isinstance(amount, bool) or not 0 < amount <= highest:
-                raise InputError(f"{name} is {amount!r}; it must be a number above 0, at most {highest:g}")
-        for name in ("resume", "refine", "compiled"):
-            if not isinstance(getattr(self, name), bool):
-                raise InputError(f"{name} is {getattr(self, name)!r}; it must be True or False")
+        check_options(self, _COUNTS)
         if self.patch % 16:
             raise InputError(f"patch is {self.patch}; it must be a multiple of 16")
         if self.channels is not None:
             object.__setattr__(self, "channels", checked_channels(self.channels))
-        if not isinstance(self.out, str | os.PathLike):
-            raise InputError(f"out is {self.out!r}; it must be the path of a folder")
-        object.__setattr__(self, "out", Path(self.out))
-        checked_device(self.device, "train with --device cpu")
-        if self.compiled:
-            checked_compiler(self.device)
         for name in ("start", "teacher"):
             given = getattr(self, name)
             if given is not None and not isinstance(given, str):
@@ -284,14 +262,3 @@ def _save(config: TrainConfig, recipe: Recipe, run: Run) -> Path:
     save_weights(weights, config.mode, recipe, run.network, record)
     save_progress(config.out, run)
     return weights
-
-
-def main() -> None:
-    """`python -m denoiser.train`: the options of TrainConfig."""
-    import tyro
-
-    print(train(tyro.cli(TrainConfig)))
-
-
-if __name__ == "__main__":
-    main()

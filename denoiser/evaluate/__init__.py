@@ -8,34 +8,6 @@ spikezoo.py     clips in Spike-Zoo's layout, by its protocol: `spikecam evaluate
 truth.py        the truth tests: `spikecam evaluate truth`, of `halves.py`, `fixed_pattern.py` and `quick.py`
 """
 
-from denoiser.evaluate.quick import (
-    GROUPS,
-    HELD_OUT_KINDS,
-    LIGHTS,
-    PHOTOGRAPHS,
-    PICTURES,
-    SPEEDS,
-    HeldOut,
-    evaluate_quick,
-    held_out,
-    held_out_textures,
-    picture_of,
-    report,
-    summary,
-)
+from denoiser.evaluate.quick import HELD_OUT_KINDS, PICTURES, evaluate_quick, held_out_textures, report
 
-__all__ = [
-    "GROUPS",
-    "HELD_OUT_KINDS",
-    "LIGHTS",
-    "PHOTOGRAPHS",
-    "PICTURES",
-    "SPEEDS",
-    "HeldOut",
-    "evaluate_quick",
-    "held_out",
-    "held_out_textures",
-    "picture_of",
-    "report",
-    "summary",
-]
+__all__ = ["HELD_OUT_KINDS", "PICTURES", "evaluate_quick", "held_out_textures", "report"]

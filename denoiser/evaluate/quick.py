@@ -17,7 +17,7 @@ their quantisation (`metrics.count_variance`).  Rates are not quantised and may 
 from __future__ import annotations
 
 import os
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -28,9 +28,9 @@ from numpy.typing import NDArray
 from tqdm import tqdm
 
 from denoiser import accumulate
+from denoiser.evaluate.restored import Weights, denoisers, restored
 from denoiser.evaluate.writing import write_result
 from denoiser.metrics import gap_closed, psnr_db, ssim
-from denoiser.online import OnlineDnSS
 from denoiser.pairs import light_in_frame
 from scenes.collage import Collage
 from scenes.textures import Texture, random_texture
@@ -65,7 +65,7 @@ class HeldOut:
 def evaluate_quick(
     modes: Sequence[str] = ("paper", "best"),
     *,
-    weights: Mapping[str, str | os.PathLike[str]] | None = None,
+    weights: Weights | None = None,
     scenes_a_class: int = 2,
     shape: tuple[int, int] = (96, 96),
     frames: int = 280,
@@ -89,15 +89,15 @@ def evaluate_quick(
         Group (`GROUPS`) -> row -> picture -> {light_db, light_ssim, clean_db, clean_ssim, gap_closed}, and "settings"
         (with the mean interval [frames] of each light level).
     """
-    denoisers = {m: _denoiser(m, (weights or {}).get(m)) for m in modes}
+    online = denoisers(modes, weights)
     scores: list[dict[str, Any]] = []
     scenes = held_out(scenes_a_class, shape, frames, seed, model)
     total = scenes_a_class * len(SPEEDS) * len(LIGHTS)
     for scene in tqdm(scenes, desc="held-out scenes", unit="scene", total=total, leave=False):
         noisy, clean, oracle = (scene.streams[row] for row in ("noisy", "clean", "oracle"))
         denoised: dict[str, Stream] = {}
-        for mode, online in denoisers.items():
-            denoised[mode], denoised[f"{mode} rate"] = _whole(online, noisy)
+        for mode, denoiser in online.items():
+            denoised[mode], denoised[f"{mode} rate"], _ = restored(denoiser, noisy, mode)
         scores += _score(scene, {"noisy": noisy, **denoised, "clean": clean, "oracle": oracle})
     result: dict[str, Any] = {
         group: summary([s for s in scores if s["speed"] in speeds and s["light"] in lights])
@@ -184,18 +184,6 @@ def picture_of(stream: Stream, kind: str, t: int) -> NDArray[np.float32]:
     return middleTFI(stream, t) if kind == "TFI" else middleTFP(stream, t, window)
 
 
-def _denoiser(mode: str, path: str | os.PathLike[str] | None) -> OnlineDnSS:
-    if path is None:
-        return OnlineDnSS.pretrained(mode, output="both")
-    return OnlineDnSS.from_file(path, output="both")
-
-
-def _whole(online: OnlineDnSS, spikes: Stream) -> tuple[Stream, Stream]:
-    online.reset()
-    (first, first_rates), (rest, rest_rates) = online.push(spikes), online.flush()
-    return np.concatenate([first, rest]), np.concatenate([first_rates, rest_rates])
-
-
 def _expose(scene: Collage, speed: str, light: str, frames: int, seed: int, model: SensorModel) -> HeldOut:
     keys = scene.radiance(0, frames)
     sensor = SpikeSensor(model, shape=scene.shape, seed=seed, engine="reference")
@@ -266,8 +254,3 @@ def _cell(s: dict[str, float | None]) -> str:
 
 def _shown(value: float | None, width: int, digits: int) -> str:
     return f"{'-':>{width}}" if value is None else f"{value:{width}.{digits}f}"
-
-
-def main() -> None:
-    """`python -m denoiser.evaluate`: the quick evaluation, printed."""
-    print(report(evaluate_quick()))

@@ -7,9 +7,9 @@
     PSNR        both pictures moved to [-1, 1], peak 2: that of [0, 1] and peak 1
     SSIM        the same pictures in [-1, 1], windows of 7 x 7, data range 2
 
-SSIM in [-1, 1] is another number than in [0, 1], which the last column has.  Its term of the local means a and b,
-(2 a b + C) / (a^2 + b^2 + C), punishes differences about mid-grey, where a and b pass through 0.  It forgives them in
-the dark.  In one thing we differ: Spike-Zoo leaves PSNR's peak to scikit-image, which takes 1 in place of 2, 6 dB
+SSIM in [-1, 1] is another number than in [0, 1], which the last column has.  Its term of the local means a and b is
+(2 a b + C) / (a^2 + b^2 + C).  It punishes differences about mid-grey, where a and b pass through 0, and forgives them
+in the dark.  In one thing we differ: Spike-Zoo leaves PSNR's peak to scikit-image, which takes 1 in place of 2, 6 dB
 less, for a picture that nowhere is darker than mid-grey.
 
 Source: K. Chen et al., https://github.com/chenkang455/Spike-Zoo (v0.2.3): `metrics/__init__.py`,

@@ -11,7 +11,6 @@ of another seed, against the true light, beside TFP 21, TFP 41 and TFI of the sa
 from __future__ import annotations
 
 import math
-import os
 import time
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -20,7 +19,7 @@ from pathlib import Path
 import torch
 from torch import Tensor, nn
 
-from denoiser.captured import captured, checked_compiler
+from denoiser.captured import captured
 from denoiser.number_type import computing_in, number_type
 from denoiser.reconstruct import ssml
 from denoiser.reconstruct.lessons import Lesson, LessonWindows, lesson_of
@@ -31,11 +30,9 @@ from denoiser.reconstruct.weights import save_reconstructor
 from denoiser.run import Run
 from denoiser.simulated import UNIT_SHAPE, Bank, SimulatedStreams
 from denoiser.training_loop import RUN_FILE, learn, save_progress
+from denoiser.training_options import check_options
 from denoiser.training_record import training_record
-from spikecam_env.checked import checked_count, checked_number, checked_seed
-from spikecam_env.errors import InputError
 from spikecam_env.run_folder import run_folder
-from spikecam_env.sensor.kernels.cuda import checked_device
 from spikecam_env.torch_settings import torch_settings
 
 VALIDATION_SEED = 1_000_003  # added to the seed: other scenes, other units, other textures of the same kinds
@@ -43,19 +40,16 @@ VALIDATION_STREAMS = 64
 VALIDATION_MOMENTS = 4
 VALIDATION_TEXTURES, VALIDATION_UNITS = 32, 16
 FRAMES_BETWEEN_MOMENTS = 64
-LARGEST_SEED = 2**62
-"""So that the seed of the validation has room above it."""
 _COUNTS = {
-    "steps": 10**9,
-    "batch": 65_536,
-    "threads": 1024,
-    "patch": min(UNIT_SHAPE),
-    "frames_a_step": WINDOW,
-    "validate_every": 10**9,
+    "seed": (0, 2**62),
+    "steps": (1, 10**9),
+    "batch": (1, 65_536),
+    "threads": (1, 1024),
+    "patch": (1, min(UNIT_SHAPE)),
+    "frames_a_step": (1, WINDOW),
+    "validate_every": (1, 10**9),
 }
-"""Options that are whole numbers from 1, with the most."""
-_AMOUNTS = {"lr": 1.0, "minutes": 1e6, "save_every_s": 1e9}
-"""Options that are numbers above 0, with the most."""
+"""Options that are whole numbers, with the least and the most; above the seed is room for that of the validation."""
 
 
 @dataclass(frozen=True)
@@ -92,21 +86,7 @@ class ReconstructorConfig:
 
     def __post_init__(self) -> None:
         self.recipe()
-        checked_seed(self.seed, "seed", LARGEST_SEED)
-        for name, most in _COUNTS.items():
-            checked_count(getattr(self, name), name, most)
-        for name, highest in _AMOUNTS.items():
-            if name != "minutes" or self.minutes is not None:
-                checked_number(getattr(self, name), name, 0.0, highest, above=True)
-        for name in ("resume", "compiled"):
-            if not isinstance(getattr(self, name), bool):
-                raise InputError(f"{name} is {getattr(self, name)!r}; it must be True or False")
-        if not isinstance(self.out, str | os.PathLike):
-            raise InputError(f"out is {self.out!r}; it must be the path of a folder")
-        object.__setattr__(self, "out", Path(self.out))
-        checked_device(self.device, "train with --device cpu")
-        if self.compiled:
-            checked_compiler(self.device)
+        check_options(self, _COUNTS)
 
     def recipe(self) -> ReconstructorRecipe:
         """The recipe to train; InputError for an unknown mode or width."""
@@ -220,14 +200,3 @@ def _save(config: ReconstructorConfig, lesson: Lesson, run: Run) -> Path:
     save_reconstructor(weights, config.mode, config.recipe(), lesson.networks["student"], record)
     save_progress(config.out, run)
     return weights
-
-
-def main() -> None:
-    """`python -m denoiser.reconstruct.train`: the options of ReconstructorConfig."""
-    import tyro
-
-    print(train_reconstructor(tyro.cli(ReconstructorConfig)))
-
-
-if __name__ == "__main__":
-    main()

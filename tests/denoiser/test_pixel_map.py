@@ -1,4 +1,4 @@
-"""The calibration map: from SNEE's results, from files and pairs; what is no map is refused."""
+"""The calibration map: from SNEE's results, from files and pairs; other objects are refused."""
 
 from __future__ import annotations
 

@@ -110,36 +110,38 @@ class Counted:
 DO = work.do
 
 
-def run(monkeypatch: pytest.MonkeyPatch, asked: TableRequest, fail_at: int | None = None) -> list[tuple[str, int, str]]:
+def run(
+    monkeypatch: pytest.MonkeyPatch, request: TableRequest, fail_at: int | None = None
+) -> list[tuple[str, int, str]]:
     """The tasks that were done for a table."""
     counted = Counted(fail_at)
     monkeypatch.setattr(work, "do", counted)
     if fail_at is None:
-        evaluate_table("table1", asked)
+        evaluate_table("table1", request)
     else:
         with pytest.raises(KeyboardInterrupt):
-            evaluate_table("table1", asked)
+            evaluate_table("table1", request)
     return counted.tasks
 
 
 def test_a_table_that_was_stopped_goes_on_where_it_was(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, result: dict
 ) -> None:
-    asked = replace(SMALL, out=tmp_path / "out")
-    done = run(monkeypatch, asked, fail_at=3)
-    rest = run(monkeypatch, asked)
+    request = replace(SMALL, out=tmp_path / "out")
+    done = run(monkeypatch, request, fail_at=3)
+    rest = run(monkeypatch, request)
     assert len(done) == 3 and not set(done) & set(rest)
     assert {*done, *rest} == {("disk", seed, s) for seed in (0, 1) for s in ("noisy", "tfp41", "clean", "light")}
     assert json.loads((tmp_path / "out" / "table1.json").read_text())["scenes"] == result["scenes"]
-    assert run(monkeypatch, asked) == []
+    assert run(monkeypatch, request) == []
 
 
 def test_more_scenes_seeds_and_intervals_are_added_to_what_is_there(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    asked = replace(SMALL, seeds=1, rows=("noisy",), shape=(16, 24), out=tmp_path)
-    assert run(monkeypatch, asked) == [("disk", 0, "noisy")]
-    more = replace(asked, seeds=2, scenes=("disk", "collage"), rows=("noisy", "clean"))
+    request = replace(SMALL, seeds=1, rows=("noisy",), shape=(16, 24), out=tmp_path)
+    assert run(monkeypatch, request) == [("disk", 0, "noisy")]
+    more = replace(request, seeds=2, scenes=("disk", "collage"), rows=("noisy", "clean"))
     assert len(run(monkeypatch, more)) == 2 * 2 * 2 - 1
     assert len(run(monkeypatch, replace(more, intervals=(10.0, 20.0)))) == 2 * 2 * 2
 
@@ -147,24 +149,24 @@ def test_more_scenes_seeds_and_intervals_are_added_to_what_is_there(
 def test_other_weights_are_measured_again_and_other_settings_are_refused(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    asked = replace(SMALL, seeds=1, rows=("noisy", "paper"), shape=(16, 24), out=tmp_path)
-    assert len(run(monkeypatch, asked)) == 2
+    request = replace(SMALL, seeds=1, rows=("noisy", "paper"), shape=(16, 24), out=tmp_path)
+    assert len(run(monkeypatch, request)) == 2
     copy = tmp_path / "paper.pt"
     copy.write_bytes(Weights().path("paper").read_bytes())
-    same = replace(asked, weights=Weights({"paper": copy}))
+    same = replace(request, weights=Weights({"paper": copy}))
     assert run(monkeypatch, same) == []
     digest = Weights.digest
     monkeypatch.setattr(Weights, "digest", lambda self, name: "other" if name == "paper" else digest(self, name))
     assert run(monkeypatch, same) == [("disk", 0, "paper")]
-    for other in (replace(asked, shape=(16, 32)), replace(asked, frames=210)):
+    for other in (replace(request, shape=(16, 32)), replace(request, frames=210)):
         with pytest.raises(InputError, match="other settings"):
             evaluate_table("table1", other)
 
 
 def test_two_processes_find_what_one_does(result: dict) -> None:
-    asked = replace(SMALL, rows=("noisy",), jobs=2)
-    rows = [r for r in result["scenes"] if r["row"] in asked.rows]
-    assert evaluate_table("table1", asked)["scenes"] == rows
+    request = replace(SMALL, rows=("noisy",), jobs=2)
+    rows = [r for r in result["scenes"] if r["row"] in request.rows]
+    assert evaluate_table("table1", request)["scenes"] == rows
 
 
 def test_rate_planes_are_judged_beside_spikes() -> None:
@@ -186,8 +188,8 @@ def test_learned_reconstructions_are_columns_and_pipelines(tmp_path: Path, monke
         reconstruct_many=lambda name, spikes, frames, weights: np.stack([middleTFP(spikes, t, 41) for t in frames]),
     )
     monkeypatch.setattr(exposed, "_reconstruction", lambda: stand_in)
-    asked = replace(SMALL, seeds=1, rows=("noisy", "tfp", "ssml", "spk2img-noisy"))
-    found = evaluate_table("table1", replace(asked, weights=Weights.found(tmp_path, {})))
+    request = replace(SMALL, seeds=1, rows=("noisy", "tfp", "ssml", "spk2img-noisy"))
+    found = evaluate_table("table1", replace(request, weights=Weights.found(tmp_path, {})))
     rows = found["groups"][0]["rows"]
     assert found["parameters"] == {"noisy": None, "tfp": None, "ssml": 12, "spk2img-noisy": 12}
     assert "SSML, then spikes, 0.00 M" in report(found)
@@ -202,12 +204,12 @@ def test_streams_come_from_a_dataset_too(tmp_path: Path) -> None:
     """Seed 0 is the dataset's camera: the same streams, so the same figures."""
     plan = phm_n(scenes=("disk",), shape=(32, 48), frames=264)
     build(plan, tmp_path / "data")
-    asked = replace(SMALL, seeds=1, frames=264, rows=("noisy", "clean"))
-    simulated = evaluate_table("table1", asked)
-    assert evaluate_table("table1", replace(asked, data=tmp_path / "data"))["groups"] == simulated["groups"]
+    request = replace(SMALL, seeds=1, frames=264, rows=("noisy", "clean"))
+    simulated = evaluate_table("table1", request)
+    assert evaluate_table("table1", replace(request, data=tmp_path / "data"))["groups"] == simulated["groups"]
     (tmp_path / "data" / "test" / "disk.h5").unlink()
     with pytest.raises(InputError, match=r"disk\.h5"):
-        evaluate_table("table1", replace(asked, data=tmp_path / "data"))
+        evaluate_table("table1", replace(request, data=tmp_path / "data"))
 
 
 def test_real_recordings_are_judged_by_niqe_or_named_as_absent(tmp_path: Path) -> None:
@@ -233,14 +235,14 @@ def test_at_rest_the_mean_of_clean_frames_is_the_light_and_that_of_noisy_ones_ha
 
 
 def test_unknown_names_and_short_streams_are_refused() -> None:
-    for asked, why in (
+    for request, why in (
         (replace(SMALL, scenes=("disks",)), "disk"),
         (replace(SMALL, rows=("bests",)), "best"),
         (replace(SMALL, frames=150), "200"),
         (replace(SMALL, seeds=0), "seeds"),
     ):
         with pytest.raises(InputError, match=why):
-            evaluate_table("table1", asked)
+            evaluate_table("table1", request)
     with pytest.raises(InputError, match="table1"):
         evaluate_table("table9")
 

@@ -1,4 +1,4 @@
-"""The rolling window: what a network sees does not depend on chunks, and is what the equations say."""
+"""The rolling window: a network's input does not depend on chunks, and follows the equations."""
 
 from __future__ import annotations
 
