@@ -23,7 +23,7 @@ class Recipe:
 
     layout: WindowLayout
     target: str
-    """The network learns it: "light" or "clean_inverse_interval"."""
+    """The quantity that the network learns, "light" or "clean_inverse_interval"."""
     decoder: str
     """"mus" (`denoiser.mus`) or "accumulate" (`denoiser.accumulate`)."""
     refine: bool = True

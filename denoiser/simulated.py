@@ -106,7 +106,7 @@ class Bank:
     textures: Tensor
     """(N, size, size) float32 in [0, 1]."""
     gain: Tensor
-    """(U, H, W) float32 [grains per light]."""
+    """(U, H, W) float32, at light 1 [grains/frame]."""
     dark: Tensor
     """(U, H, W) float32 [grains/frame]."""
     spread: Tensor

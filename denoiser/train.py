@@ -32,7 +32,7 @@ from denoiser.simulated import Bank, SimulatedStreams
 from denoiser.smaller import narrowed, without_refine
 from denoiser.stream_network import StreamDnSS
 from denoiser.training_loop import RUN_FILE, learn, save_progress
-from denoiser.training_options import check_options
+from denoiser.training_options import TrainingOptions
 from denoiser.training_record import training_record
 from denoiser.weights import load_weights, save_weights
 from spikecam_env.errors import InputError
@@ -46,62 +46,32 @@ NARROWING_PASSES = 16
 PASSES = {"light": 3, "clean_inverse_interval": 1}
 """Passes of each stream in a step, by the network's target."""
 
-_COUNTS = {
-    "steps": (1, 10**9),
-    "batch": (1, 65_536),
-    "seed": (0, 2**62),
-    "threads": (1, 1024),
-    "patch": (16, 128),
-    "validate_every": (1, 10**9),
-    "validate_passes": (1, 10**6),
-}
-"""Options that are whole numbers, with the least and the most."""
-
 
 @dataclass(frozen=True)
-class TrainConfig:
-    """Options of a training; the run ends after `steps`, or `minutes` where that is given."""
+class TrainConfig(TrainingOptions):
+    """Options of a denoiser's training."""
 
     mode: str = "best"
     """"best", "fast" or "paper"."""
-    out: Path = Path("training")
-    """Folder."""
-    steps: int = 20_000
-    batch: int = 16
-    """Streams a step."""
-    seed: int = 0
-    threads: int = 1
-    """Of the processor."""
-    resume: bool = True
-    """Go on from out/last.pt."""
-    minutes: float | None = None
-    patch: int = 64
-    """Side of the streams [pixels], a multiple of 16."""
-    lr: float = 1e-3
-    """Highest rate of learning."""
     refine: bool = True
     """`paper` with its refine module or, for the ablation, without."""
     channels: tuple[int, int, int] | None = None
     """Of `best` and `fast`, as `stream_network.StreamDnSS` has them: fewer are faster, and less accurate.  None: the
     mode's."""
-    save_every_s: float = 60.0
-    validate_every: int = 1000
-    """Steps between validations."""
     validate_passes: int = 24
     """Passes of each validation along its streams."""
-    device: str = "cpu"
-    """Of streams and network; a GPU wants larger batches."""
     start: str | None = None
     """Weights of the same mode to begin from: a file of this training, or a mode's name for those that ship.  A network
     with more channels, or with the refine module, is made smaller (`smaller`)."""
     teacher: str | None = None
     """Not of `paper`: weights whose rates the network is to learn instead of the light, a file or "best"."""
-    compiled: bool = False
-    """The simulated light by `torch.compile`, on a processor too; a GPU always does."""
+
+    counts = TrainingOptions.counts | {"patch": (16, 128), "validate_passes": (1, 10**6)}
+    flags = ("resume", "refine", "compiled")
 
     def __post_init__(self) -> None:
         recipe_of(self.mode)
-        check_options(self, _COUNTS)
+        super().__post_init__()
         if self.patch % 16:
             raise InputError(f"patch is {self.patch}; it must be a multiple of 16")
         if self.channels is not None:

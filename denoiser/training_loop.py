@@ -11,13 +11,13 @@ import math
 import time
 from collections.abc import Callable
 from pathlib import Path
-from typing import Protocol
 
 import torch
 from torch import Tensor
 from tqdm import tqdm
 
 from denoiser.run import Run
+from denoiser.training_options import TrainingOptions
 from spikecam_env.whole import whole_file, write_text_whole
 
 WARM_UP_STEPS = 100
@@ -25,36 +25,8 @@ RUN_FILE = "last.pt"
 """File in the folder of a run, from which it is resumed."""
 
 
-class Limits(Protocol):
-    """A training's options, as far as the loop reads them."""
-
-    @property
-    def mode(self) -> str:
-        """Shown beside the progress bar."""
-
-    @property
-    def steps(self) -> int:
-        """Steps in all."""
-
-    @property
-    def minutes(self) -> float | None:
-        """Minutes in all; they count instead of the steps where they are given."""
-
-    @property
-    def lr(self) -> float:
-        """Highest rate of learning."""
-
-    @property
-    def validate_every(self) -> int:
-        """Steps."""
-
-    @property
-    def save_every_s(self) -> float:
-        """Seconds."""
-
-
 def learn(
-    limits: Limits,
+    limits: TrainingOptions,
     run: Run,
     step_of: Callable[[], Callable[[], Tensor]],
     validate: Callable[[], dict[str, float]],
@@ -99,7 +71,7 @@ def learn(
     return save()
 
 
-def share_done(limits: Limits, run: Run) -> float:
+def share_done(limits: TrainingOptions, run: Run) -> float:
     """Share of the run that is over, by the clock where it is limited by minutes."""
     return run.step / limits.steps if limits.minutes is None else run.seconds / (60 * limits.minutes)
 

@@ -4,12 +4,11 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from spikecam_env.errors import InputError
+from denoiser.reconstruct import reconstruct, reconstruct_many
 from spikecam_env.streams import isi_plane, middleTFP
 from spikecam_env.types import Spikes
 
@@ -70,19 +69,11 @@ def picture(name: str, spikes: Spikes, t: int, weights: Path | None = None) -> P
         return isi_plane(spikes, t, normalised=True)
     if name in CLASSICAL:
         return middleTFP(spikes, t, CLASSICAL[name])
-    return _reconstruction().reconstruct(name, spikes, t, weights=weights)  # type: ignore[no-any-return]
+    return reconstruct(name, spikes, t, weights=weights)
 
 
 def film(name: str, spikes: Spikes, frames: range, weights: Path | None = None) -> Planes:
     """(len(frames), H, W) pictures [spikes/frame] at many frames of the stream; weights as for `picture`."""
     if name in CLASSICAL:
         return np.stack([picture(name, spikes, t) for t in frames])
-    return np.asarray(_reconstruction().reconstruct_many(name, spikes, list(frames), weights=weights), np.float32)
-
-
-def _reconstruction() -> Any:
-    try:
-        import denoiser.reconstruct as reconstruction
-    except ImportError as error:
-        raise InputError("this package has no learned reconstruction (denoiser.reconstruct)") from error
-    return reconstruction
+    return reconstruct_many(name, spikes, frames, weights=weights)

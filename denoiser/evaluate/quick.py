@@ -29,7 +29,7 @@ from tqdm import tqdm
 
 from denoiser import accumulate
 from denoiser.evaluate.restored import Weights, denoisers, restored
-from denoiser.evaluate.writing import write_result
+from denoiser.evaluate.writing import number, write_result
 from denoiser.metrics import gap_closed, psnr_db, ssim
 from denoiser.pairs import light_in_frame
 from scenes.collage import Collage
@@ -248,9 +248,5 @@ def _table(title: str, table: Summary) -> str:
 
 def _cell(s: dict[str, float | None]) -> str:
     gap = None if s["gap_closed"] is None else 100 * s["gap_closed"]
-    light = f"| {_shown(s['light_db'], 7, 2)} {_shown(s['light_ssim'], 6, 3)} {_shown(gap, 5, 0)} % "
-    return light + f"| {_shown(s['clean_db'], 9, 2)} {_shown(s['clean_ssim'], 8, 3)}  "
-
-
-def _shown(value: float | None, width: int, digits: int) -> str:
-    return f"{'-':>{width}}" if value is None else f"{value:{width}.{digits}f}"
+    light = f"| {number(s['light_db'], 7, 2)} {number(s['light_ssim'], 6, 3)} {number(gap, 5, 0)} % "
+    return light + f"| {number(s['clean_db'], 9, 2)} {number(s['clean_ssim'], 8, 3)}  "

@@ -27,6 +27,7 @@ from denoiser.evaluate import held, still
 from denoiser.evaluate.exposed import CLASSICAL, ExposedStreams, Planes, StreamCase, film
 from denoiser.online import OnlineDnSS
 from denoiser.plain_torch import read_plain
+from denoiser.weights import load_weights
 from spikecam_env.errors import InputError
 from spikecam_env.types import Spikes
 from spikecam_env.untrusted import existing_file
@@ -182,8 +183,6 @@ def planes_a_pass(source: str, weights: Weights) -> int:
 
 @lru_cache(maxsize=8)
 def _passes(path: Path) -> int:
-    from denoiser.weights import load_weights
-
     return load_weights(path)[0].layout.planes
 
 

@@ -7,6 +7,7 @@ from typing import Any
 
 from denoiser.evaluate.judge import COLUMNS, PLANE
 from denoiser.evaluate.rows import ROWS
+from denoiser.evaluate.writing import number
 
 WIDTH = 41
 """Of the column of rows: the longest title with the size of its network."""
@@ -70,12 +71,12 @@ def _measures(group: dict[str, Any], rows: Sequence[str]) -> list[str]:
     ]
     for row, m in found.items():
         size = None if m["bias"] is None else 100 * m["bias"]
-        places = " ".join(_number(db, 4, 1) for db in m["db_by_place"])
+        places = " ".join(number(db, 4, 1) for db in m["db_by_place"])
         lines.append(
-            f"{ROWS[row].title:{WIDTH}}| {_number(size, 7, 2)} {_number(m['lag'], 6, 2)} "
-            f"| {_number(m['mean_plane']['db'], 13, 2)} {_number(m['mean_plane']['ssim'], 6, 3)} "
-            f"| {_number(m['flicker'], 7, 2)} {_number(m['texture'], 8, 2)} "
-            f"| {_number(m['mean_db'], 7, 2)} {_number(m['last_db'], 8, 2)} | {places}".rstrip()
+            f"{ROWS[row].title:{WIDTH}}| {number(size, 7, 2)} {number(m['lag'], 6, 2)} "
+            f"| {number(m['mean_plane']['db'], 13, 2)} {number(m['mean_plane']['ssim'], 6, 3)} "
+            f"| {number(m['flicker'], 7, 2)} {number(m['texture'], 8, 2)} "
+            f"| {number(m['mean_db'], 7, 2)} {number(m['last_db'], 8, 2)} | {places}".rstrip()
         )
     return ["\n".join(lines)]
 
@@ -85,12 +86,8 @@ def _cell(score: dict[str, float | None] | None) -> str:
         return f"{'-':>5}"
     gap = score.get("gap_closed")
     share = "" if gap is None else f"{100 * gap:4.0f} %"
-    return f"{score['db']:5.2f} {_number(score['db_spread'], 4, 2)} {_number(score['ssim'], 5, 3)} {share}"
+    return f"{score['db']:5.2f} {number(score['db_spread'], 4, 2)} {number(score['ssim'], 5, 3)} {share}"
 
 
 def _niqe(score: dict[str, float | None] | None) -> str:
-    return f"{'-':>5}" if score is None else _number(score["niqe"], 5, 2)
-
-
-def _number(value: float | None, width: int, digits: int) -> str:
-    return f"{'-':>{width}}" if value is None else f"{value:{width}.{digits}f}"
+    return f"{'-':>5}" if score is None else number(score["niqe"], 5, 2)

@@ -30,7 +30,7 @@ from denoiser.reconstruct.weights import save_reconstructor
 from denoiser.run import Run
 from denoiser.simulated import UNIT_SHAPE, Bank, SimulatedStreams
 from denoiser.training_loop import RUN_FILE, learn, save_progress
-from denoiser.training_options import check_options
+from denoiser.training_options import TrainingOptions
 from denoiser.training_record import training_record
 from spikecam_env.run_folder import run_folder
 from spikecam_env.torch_settings import torch_settings
@@ -40,53 +40,26 @@ VALIDATION_STREAMS = 64
 VALIDATION_MOMENTS = 4
 VALIDATION_TEXTURES, VALIDATION_UNITS = 32, 16
 FRAMES_BETWEEN_MOMENTS = 64
-_COUNTS = {
-    "seed": (0, 2**62),
-    "steps": (1, 10**9),
-    "batch": (1, 65_536),
-    "threads": (1, 1024),
-    "patch": (1, min(UNIT_SHAPE)),
-    "frames_a_step": (1, WINDOW),
-    "validate_every": (1, 10**9),
-}
-"""Options that are whole numbers, with the least and the most; above the seed is room for that of the validation."""
 
 
 @dataclass(frozen=True)
-class ReconstructorConfig:
-    """Options of a training; the run ends after `steps`, or `minutes` where that is given."""
+class ReconstructorConfig(TrainingOptions):
+    """Options of a reconstructor's training; every stream of `batch` gives a window a step."""
 
     mode: str = "spk2img-noisy"
     """"spk2img-clean", "spk2img-noisy" or "ssml"."""
-    out: Path = Path("training")
-    """Folder."""
-    steps: int = 20_000
     batch: int = 64
-    """Streams, each a window a step."""
-    seed: int = 0
-    threads: int = 1
-    resume: bool = True
-    """Go on from out/last.pt."""
-    minutes: float | None = None
-    patch: int = 64
-    """Side of the streams [pixels]."""
-    lr: float = 1e-3
-    """Highest rate of learning."""
-    save_every_s: float = 60.0
     validate_every: int = 500
-    """Steps between validations."""
-    device: str = "cpu"
-    """Of network and streams."""
     width: int | None = None
     """Channels; None: the recipe's."""
     frames_a_step: int = 12
-    """By which the streams go on."""
-    compiled: bool = False
-    """The simulated light by `torch.compile`, on a processor too; a GPU always does."""
+    """Frames by which the streams go on."""
+
+    counts = TrainingOptions.counts | {"patch": (1, min(UNIT_SHAPE)), "frames_a_step": (1, WINDOW)}
 
     def __post_init__(self) -> None:
         self.recipe()
-        check_options(self, _COUNTS)
+        super().__post_init__()
 
     def recipe(self) -> ReconstructorRecipe:
         """The recipe to train; InputError for an unknown mode or width."""

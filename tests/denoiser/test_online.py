@@ -22,7 +22,7 @@ SHAPE = (9, 14)
 MAP = (np.linspace(0.8, 1.2, 9 * 14).reshape(SHAPE), np.full(SHAPE, 0.002))
 KINDS = {
     "paper": ("paper", {}),
-    "stride": ("paper", {"stride": 3}),
+    "stride": ("paper", {"stride": 3, "decoder": "mus"}),
     "best": ("best", {}),
     "overlap": ("best", {"overlap": True}),
     "map": ("best", {"unit": MAP}),

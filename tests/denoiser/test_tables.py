@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 from dataclasses import replace
 from pathlib import Path
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -183,11 +182,12 @@ def test_learned_reconstructions_are_columns_and_pipelines(tmp_path: Path, monke
     """TFP 41 stands in for them: their columns and rows are then its own."""
     for name in ("ssml", "spk2img-clean", "spk2img-noisy"):
         torch.save({"state_dict": {"weight": torch.zeros(3, 4)}}, tmp_path / f"{name}.pt")
-    stand_in = SimpleNamespace(
-        reconstruct=lambda name, spikes, t, weights: middleTFP(spikes, t, 41),
-        reconstruct_many=lambda name, spikes, frames, weights: np.stack([middleTFP(spikes, t, 41) for t in frames]),
-    )
-    monkeypatch.setattr(exposed, "_reconstruction", lambda: stand_in)
+
+    def films(name, spikes, frames, weights):
+        return np.stack([middleTFP(spikes, t, 41) for t in frames])
+
+    monkeypatch.setattr(exposed, "reconstruct", lambda name, spikes, t, weights: middleTFP(spikes, t, 41))
+    monkeypatch.setattr(exposed, "reconstruct_many", films)
     request = replace(SMALL, seeds=1, rows=("noisy", "tfp", "ssml", "spk2img-noisy"))
     found = evaluate_table("table1", replace(request, weights=Weights.found(tmp_path, {})))
     rows = found["groups"][0]["rows"]

@@ -195,7 +195,7 @@ def test_the_rate_of_learning_warms_up_and_falls_to_nothing():
         ),
         (
             {"channels": (32, 64, 12), "compiled": True},
-            "spikecam train --mode best --out OUT --channels 32 64 12 --compiled",
+            "spikecam train --mode best --out OUT --compiled --channels 32 64 12",
         ),
     ],
 )
