@@ -18,9 +18,10 @@ from spikecam_env.compiled import njit
 
 
 class AccumulateState(NamedTuple):
-    """charge: (H, W) float64 in [0, 1), what each pixel carries into the next frame."""
+    """The decoder's state."""
 
     charge: NDArray[np.float64]
+    """(H, W) in [0, 1), the charge that each pixel carries into the next frame."""
 
 
 def start(shape: tuple[int, int]) -> AccumulateState:

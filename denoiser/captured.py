@@ -1,4 +1,4 @@
-"""Work that a GPU replays, a step of training or a denoiser's pass: many small kernels, whose launches take longer."""
+"""Work that a GPU replays: a step or a pass has many small kernels, and their launches take longer than they do."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from torch import Tensor
 from spikecam_env.errors import InputError
 
 WARM_UPS = 3
-"""Calls before the capture: kernels are chosen and memory is taken in them.  They do what the step does."""
+"""Calls before the capture, in which kernels are chosen and memory is taken.  They are steps like any other."""
 
 
 def captured(
@@ -20,8 +20,10 @@ def captured(
 ) -> Callable[[], Tensor]:
     """The step; on a GPU recorded once, after WARM_UPS calls of it, and replayed from then on.
 
-    step: the same work at every call, on tensors that stay where they are; its result is copied out.
-    generator: all that the step draws from, if it draws.
+    Args:
+        step: the same work at every call, on tensors that stay where they are; its result is copied out.
+        device: where the step works.
+        generator: the source of the step's draws, if it draws.
     """
     if device.type != "cuda":
         return step
@@ -45,7 +47,7 @@ def captured(
 
 
 def checked_compiler(device: str) -> None:
-    """Raises InputError where `torch.compile` finds no C++ compiler for a processor."""
+    """Raise InputError where `torch.compile` finds no C++ compiler for a processor."""
     compilers = (os.environ.get("CXX", ""), "g++", "clang++", "c++")
     if torch.device(device).type == "cpu" and not any(map(shutil.which, compilers)):
         raise InputError("compiled needs a C++ compiler on a processor; install g++, or leave it out")

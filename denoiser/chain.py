@@ -1,8 +1,8 @@
 """The passes of a network over one stream, one after another, and the mean of two such chains whose passes overlap.
 
-A pass knows the frames in its middle better than those at its ends.  So two chains half a pass apart, each frame the
-mean of both with weights that fall towards the ends of a pass, err less, and no seam shows between passes; the work is
-twice as much.
+A pass knows the frames in its middle better than those at its ends.  So the mean of two chains half a pass apart errs
+less, and no seam shows between passes.  The weights of the mean fall towards the ends of a pass.  The work is twice as
+much.
 """
 
 from __future__ import annotations
@@ -25,16 +25,26 @@ Rates = NDArray[np.float32]
 
 
 class PassChain:
-    """Passes over one stream from frame `first` on; what a pass leaves, the next gets.
+    """Passes over one stream; each pass hands its rate and hidden picture to the next.
 
-    The chain knows nothing of the frames before: to its network the stream begins there, as streams do in training.
-    stride: evaluate the network in every stride-th frame and hold its plane in between (networks of one plane a pass).
+    The chain knows nothing of the frames before its first: to its network the stream begins there, as streams do in
+    training.
+
+    Args:
+        recipe: of the network.
+        network: as `infer.prepared` makes it.
+        number_type: in which it computes.
+        shape: (rows, columns).
+        unit: calibration map.
+        stride: evaluate the network in every stride-th frame and hold its plane in between (networks of one plane a
+            pass).
+        first: frame of the stream from which on there are passes.
     """
 
     def __init__(
         self,
         recipe: Recipe,
-        network: nn.Module | infer.StreamPasses,
+        network: nn.Module,
         number_type: torch.dtype,
         shape: tuple[int, int],
         *,
@@ -64,8 +74,7 @@ class PassChain:
         return map(self._passed, self.windows(chunk))
 
     def windows(self, chunk: NDArray[np.uint8]) -> Iterator[PassWindow]:
-        """`push` for a caller that runs the network: the passes that (K, H, W) more frames complete.  Each is to go
-        through `passed` before the next is asked for."""
+        """`push` for a caller that runs the network: each window is to go through `passed` before the next is taken."""
         skip = min(self._first - self._skipped, len(chunk))
         self._skipped += skip
         return self._window.push(chunk[skip:])
@@ -75,12 +84,12 @@ class PassChain:
         return map(self._passed, self._window.end())
 
     def state(self) -> dict[str, Any]:
-        """Everything that later passes depend on (copies)."""
+        """A copy of everything on which later passes depend."""
         held, carried = copy.deepcopy(self._held), copy.deepcopy(self._carried)
         return {"window": self._window.state(), "held": held, "carried": carried, "skipped": self._skipped}
 
     def restore(self, state: dict[str, Any]) -> None:
-        """Go on from `state()`; raises InputError for arrays of another size or type."""
+        """Go on from `state()`; InputError for arrays of another size or type."""
         self._window.restore(state["window"])
         if state["held"] is not None:
             check_like(state["held"], np.empty((1, *self.shape), np.float32), "held", lengths=False)
@@ -92,17 +101,17 @@ class PassChain:
 
     @property
     def carried(self) -> infer.Carried:
-        """What the last pass left for the next."""
+        """The arrays that the last pass left for the next."""
         return self._carried
 
     def wants(self, window: PassWindow) -> bool:
         """Whether the network is to be run for this window, or its last plane held."""
         return window.start % self._stride == 0 or self._held is None
 
-    def passed(self, window: PassWindow, found: tuple[Rates, infer.Carried] | None) -> tuple[int, Rates]:
-        """The first frame of a pass, and its rates; found: what the network gave, None where it was not run."""
-        if found is not None:
-            self._held, self._carried = found
+    def passed(self, window: PassWindow, result: tuple[Rates, infer.Carried] | None) -> tuple[int, Rates]:
+        """The first frame of a pass, and its rates.  `result`: of the network, None where it was not run."""
+        if result is not None:
+            self._held, self._carried = result
         assert self._held is not None
         self._window.learn(window, self._held)
         return self._first + window.start, self._held
@@ -142,11 +151,11 @@ class Crossfade:
         return out
 
     def state(self) -> dict[str, Any]:
-        """Everything that later frames depend on (copies)."""
+        """A copy of everything on which later frames depend."""
         return {"first": self._first, "sum": self._sum.copy(), "weight": self._weight.copy()}
 
     def restore(self, state: dict[str, Any]) -> None:
-        """Go on from `state()`; raises InputError for arrays of another size or type."""
+        """Go on from `state()`; InputError for arrays of another size or type."""
         check_like(state["sum"], self._sum, "sum", lengths=False)
         check_like(state["weight"], self._weight, "weight", lengths=False)
         self._first, self._sum, self._weight = int(state["first"]), state["sum"].copy(), state["weight"].copy()

@@ -1,15 +1,11 @@
 """A torch `Dataset` over a folder of recordings: windows of noisy spikes, with the clean twin's normalised ISI plane.
 
-    data = SpikeWindows("spift", split="train", crop=(64, 64))
-    loader = torch.utils.data.DataLoader(data, batch_size=16, shuffle=True, num_workers=2)
-
 The target is the paper's, (22): 1 / ISI of the noise-free stream at the window's middle frame.  Windows start after
-noisy and clean twins have forgotten their common phase (DESIGN section 7).
+noisy and clean twins have forgotten their common phase, 64 frames after the start.
 """
 
 from __future__ import annotations
 
-import operator
 from pathlib import Path
 from typing import Any, TypedDict
 
@@ -19,36 +15,52 @@ from torch import Tensor
 from torch.utils.data import Dataset
 
 from denoiser.pairs import WARM_UP
-from spikecam_env.checked import checked_shape
+from spikecam_env.checked import checked_seed, checked_shape, checked_whole
 from spikecam_env.datasets import read_window
 from spikecam_env.datasets.manifest import Manifest
 from spikecam_env.errors import InputError
 
 
 class Item(TypedDict):
-    """spikes (2 reach + 1, h, w) uint8, noisy; clean_isi (h, w) float32, 1 / ISI of the clean stream at `frame`.
-
-    scene: number of the file in `SpikeWindows.paths`.  frame, row, column: the middle frame and the crop's corner.
-    """
+    """A window of one scene."""
 
     spikes: Tensor
+    """(2 reach + 1, h, w) uint8, noisy."""
     clean_isi: Tensor
+    """(h, w) float32, 1 / ISI of the clean stream at `frame`."""
     scene: int
+    """Number of the file in `SpikeWindows.paths`."""
     frame: int
+    """The middle frame."""
     row: int
+    """Of the crop's corner."""
     column: int
+    """Of the crop's corner."""
 
 
 class SpikeWindows(Dataset[Item]):
-    """Windows at every `stride`-th frame of every scene of a split, each with one random crop.
+    """Windows at every `stride`-th frame of every scene of a split, each with one random crop, for a torch
+    `DataLoader`.
 
-    folder  of a finished dataset (`spikecam dataset`)
-    split   "train" or "test"
-    reach   frames before and after the middle one; 20 is the paper's window of 41
-    crop    (rows, columns); None: the whole picture
-    seed    of the crops; item i of an epoch is always the same.  Set `epoch` before each pass to draw others
-    Errors: InputError for a folder that is no dataset or not finished, a split that it has not, and a window or a crop
-    that its scenes are too small for.
+    Args:
+        folder: of a finished dataset (`spikecam dataset`).
+        split: "train" or "test".
+        reach: frames before and after the middle one; 20 is the paper's window of 41.
+        crop: (rows, columns); None: the whole picture.
+        stride: frames between windows.
+        seed: of the crops; item i of an epoch is always the same.  Set `epoch` before each pass to draw others.
+
+    Raises:
+        InputError: the folder is no dataset or not finished, has no such split, or its scenes are too small for a
+            window or a crop.
+
+    Example:
+        >>> from spikecam_env.datasets import Plan, PlannedScene, build
+        >>> plan = Plan("mine", (PlannedScene("train/disk.h5", "disk", 0, 0),), shape=(16, 24), frames=160)
+        >>> built = build(plan, "windows")
+        >>> item = SpikeWindows("windows", crop=(8, 8))[0]
+        >>> item["spikes"].shape, item["clean_isi"].shape
+        (torch.Size([41, 8, 8]), torch.Size([8, 8]))
     """
 
     def __init__(
@@ -68,14 +80,14 @@ class SpikeWindows(Dataset[Item]):
             raise InputError(f"{folder} has no scenes of split {split!r}; it has {', '.join(sorted(splits))}")
         if any(file["sha256"] is None for file in files):
             raise InputError(f"{folder} is not finished; run its `spikecam dataset` command again")
-        reach, stride, seed = _whole(reach, "reach", 0), _whole(stride, "stride", 1), _whole(seed, "seed", 0)
+        stride = checked_whole(stride, "stride", 1)
         rows, columns = manifest.settings["shape"]
         self.paths = [Path(folder) / file["path"] for file in files]
         self.shape = (int(rows), int(columns))
         self.crop = self.shape if crop is None else checked_shape(crop)
         if not all(n <= full for n, full in zip(self.crop, self.shape, strict=True)):
             raise InputError(f"crop {self.crop}; it must be at most {self.shape}")
-        self.reach, self.seed = reach, seed
+        self.reach, self.seed = checked_whole(reach, "reach", 0), checked_seed(seed)
         self._epoch = torch.zeros(1, dtype=torch.int64).share_memory_()
         self.frames = range(WARM_UP + reach, int(manifest.settings["frames"]) - reach, stride)
         if not self.frames:
@@ -91,7 +103,7 @@ class SpikeWindows(Dataset[Item]):
 
     @epoch.setter
     def epoch(self, epoch: int) -> None:
-        self._epoch[0] = _whole(epoch, "epoch", 0)
+        self._epoch[0] = checked_seed(epoch, "epoch")
 
     def __setstate__(self, state: dict[str, Any]) -> None:
         """A copy shares its epoch with the workers it gets, not with the data set it is a copy of."""
@@ -119,13 +131,3 @@ class SpikeWindows(Dataset[Item]):
             "row": row,
             "column": column,
         }
-
-
-def _whole(value: Any, name: str, least: int) -> int:
-    try:
-        number = operator.index(value)
-    except TypeError:
-        number = least - 1
-    if not least <= number < 2**63:
-        raise InputError(f"{name} is {value!r}; it must be a whole number, {least} or more")
-    return number

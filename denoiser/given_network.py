@@ -1,7 +1,7 @@
 """A network that a user gives to the denoiser: checked before it is copied, and its output before it is used.
 
-A network of the recipe's own class computes passes by `passed`, which sees less data twice.  Any other module, as
-`torch.compile(network)` is one, is called: what it adds to the network within it acts.
+A network of the recipe's own class computes passes by `passed`, which reads less data twice.  Any other module, as
+`torch.compile(network)` is one, is called: its additions to the network within it act.
 """
 
 from __future__ import annotations
@@ -22,14 +22,14 @@ COMPILED, PARALLEL = "_orig_mod.", "module."
 
 
 def check_network(recipe: Any, network: Any) -> None:
-    """Refuse what is no network of this recipe, or cannot compute.
+    """Refuse a network that is not of this recipe, or cannot compute.
 
     Args:
         recipe: a `Recipe`, else refused.
         network: its network (`recipe.network()`, `load_weights(path)`), or a module that takes and gives the same.
 
     Raises:
-        InputError: says what was given, and what to give.
+        InputError: names the given object, and the one to give.
     """
     if not isinstance(recipe, Recipe):
         raise InputError(f"recipe is a {type(recipe).__name__}; give a Recipe, for one `recipe_of('best')`")
@@ -49,11 +49,11 @@ def check_network(recipe: Any, network: Any) -> None:
 
 
 def check_output(network: nn.Module, found: Any, sizes: tuple[int, int, int, int]) -> tuple[Tensor, tuple[Tensor, ...]]:
-    """What a module returned for a batch: rates and what is carried.
+    """The rates and carried tensors that a module returned for a batch.
 
     Args:
         network: the module, for the error's text.
-        found: what it returned.
+        found: the returned object.
         sizes: (N, planes, H, W) of the batch; planes are those that are used, it may return more.
 
     Raises:
@@ -71,10 +71,8 @@ def check_output(network: nn.Module, found: Any, sizes: tuple[int, int, int, int
 
 
 def has_passes(network: Any) -> bool:
-    """Whether a network's own class has `passed`, and nothing is hung on the network that only a call reaches.
-
-    A wrapper that hands on its network's attributes has none.
-    """
+    """Whether a network's own class, not a class around it, has `passed`, and no hook is on it that only a call
+    reaches."""
     called = any(vars(network).get(name) for name in ("_forward_hooks", "_forward_pre_hooks", "forward"))
     return hasattr(type(network), "passed") and not called
 

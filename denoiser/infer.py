@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import copy
 from collections.abc import Sequence
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 import torch
@@ -21,18 +21,9 @@ from denoiser.window import PassWindow
 from spikecam_env.own_code import own_code
 
 
-class StreamPasses(Protocol):
-    """A network of many planes a pass: `StreamDnSS`, or the same elsewhere than in torch."""
-
-    def passed(self, seen: Tensor, beside: Tensor, hidden: Tensor, planes: Tensor | None) -> tuple[Tensor, Tensor]:
-        """As `StreamDnSS.passed`."""
-
-
 def prepared(network: nn.Module, number_type: torch.dtype) -> nn.Module:
-    """A copy for many passes: weights in the type that autocast computes in, so that no pass converts them.
-
-    `rates` gives the same bits with it: autocast still decides what each operation computes in.
-    """
+    """A copy for many passes: weights in the type in which autocast computes, so that no pass converts them.  The bits
+    of `rates` are the same."""
 
     def copied() -> nn.Module:
         mine = copy.deepcopy(network).eval().requires_grad_(False)
@@ -42,18 +33,19 @@ def prepared(network: nn.Module, number_type: torch.dtype) -> nn.Module:
 
 
 Carried = tuple[NDArray[np.float32], ...]
-"""What a pass leaves for the next, as arrays (n, h, w); empty before the first, and for networks that carry nothing."""
+"""Arrays (n, h, w) that a pass leaves for the next; empty before the first, and for networks that carry nothing."""
 
 
 def rates(
-    network: nn.Module | StreamPasses, window: PassWindow, number_type: torch.dtype, carried: Carried = ()
+    network: nn.Module, window: PassWindow, number_type: torch.dtype, carried: Carried = ()
 ) -> tuple[NDArray[np.float32], Carried]:
-    """Rates (count, H, W) float32 of the frames that the window covers, in [0, 1] [spikes/frame]; what is carried."""
+    """Rates (count, H, W) float32 of the frames that the window covers, in [0, 1] [spikes/frame], and the carried
+    arrays."""
     return rates_of_many(network, [window], number_type, [carried])[0]
 
 
 def rates_of_many(
-    network: nn.Module | StreamPasses,
+    network: nn.Module,
     windows: Sequence[PassWindow],
     number_type: torch.dtype,
     carried: Sequence[Carried],
@@ -92,7 +84,7 @@ def _as_in_training(
     carried: Sequence[Carried],
     device: torch.device,
 ) -> tuple[Tensor, tuple[Tensor, ...]]:
-    """Rates (N, planes, H, W), and what is carried on."""
+    """Rates (N, planes, H, W) and the carried tensors."""
     layout = torch.channels_last
     spikes = torch.from_numpy(np.stack([w.spikes for w in windows])).to(device, number_type)
     planes = torch.from_numpy(np.stack([w.planes for w in windows])).to(device)
@@ -103,14 +95,13 @@ def _as_in_training(
 
 
 def _side_by_side(
-    network: StreamPasses,
+    network: Any,
     windows: Sequence[PassWindow],
     number_type: torch.dtype,
     carried: Sequence[Carried],
     device: torch.device,
 ) -> tuple[Tensor, tuple[Tensor, ...]]:
-    """The same bits, with one array of all that the network sees instead of three, and no work for means that no
-    unit's map lets it use."""
+    """The same bits from one array instead of three, and no work for means that no unit's map lets it use."""
     seen = side_by_side(windows, [c[0] if c else None for c in carried], number_type, MULTIPLE)
     before = _stacked(carried)
     nothing = (len(windows), CARRY, seen.shape[2] // 2, seen.shape[3] // 2)
@@ -128,6 +119,7 @@ def _side_by_side(
 
 
 def _stacked(carried: Sequence[Carried]) -> Carried:
-    """What each stream carries, (N, n, h, w); zeros, which is what a network begins with, where one carries nothing."""
+    """The carried arrays of all streams, (N, n, h, w); zeros, with which a network begins, where a stream carries
+    nothing."""
     some = next((c for c in carried if c), ())
     return tuple(np.stack([c[i] if c else np.zeros_like(like) for c in carried]) for i, like in enumerate(some))

@@ -31,24 +31,32 @@ POOL = 4
 
 
 class Taught(NamedTuple):
-    """Windows of N streams at their middle frames.
-
-    predicted, target, light: (N, 1, H, W), the network's rate, the clean interval, the light [spikes/frame].
-    noisy: (N, 1, H, W), the noisy interval, which the network saw.  valid: (N,) float32, 1 where the window counts.
-    """
+    """Windows of N streams at their middle frames, with the network's output and its target."""
 
     predicted: Tensor
+    """(N, 1, H, W) the network's rate [spikes/frame]."""
     target: Tensor
+    """(N, 1, H, W) the clean interval [spikes/frame]."""
     light: Tensor
+    """(N, 1, H, W) [spikes/frame]."""
     noisy: Tensor
+    """(N, 1, H, W) the noisy interval, part of the network's input."""
     valid: Tensor
+    """(N,) float32, 1 where the window counts."""
 
 
 class IntervalWindows:
     """Simulated streams, cut to the windows of a network of one plane a pass; streams are taken in turn.
 
-    taken: windows a step.  pool: streams for each of them.  patch: their side [pixels].  seed: everything follows from
-    it.  bank, compiled: as for `SimulatedStreams`.
+    Args:
+        layout: of the windows.
+        taken: windows a step.
+        patch: side of the streams [pixels].
+        device: of the streams.
+        seed: everything follows from it.
+        pool: streams for each window of a step.
+        bank: as for `SimulatedStreams`.
+        compiled: as for `SimulatedStreams`.
     """
 
     def __init__(
@@ -124,10 +132,12 @@ class IntervalWindows:
 
 
 def inverse_interval(frames: Tensor, last: Tensor, t: int) -> Tensor:
-    """1/ISI at frame t of (N, T, H, W) spikes, as `streams.isi_planes`: (N, 1, H, W) float32.
+    """1/ISI at frame t of many streams, as `streams.isi_planes`: (N, 1, H, W) float32.
 
-    last: (N, H, W) int32, time of the last spike before frame 0.  A spike that does not come within the frames is taken
-    to come after them.
+    Args:
+        frames: (N, T, H, W) spikes.  A spike that does not come within them is taken to come after them.
+        last: (N, H, W) int32, time of the last spike before frame 0.
+        t: frame.
     """
     times = torch.arange(frames.shape[1], device=frames.device, dtype=torch.int32)[None, :, None, None]
     begin = torch.where(frames[:, : t + 1] > 0, times[:, : t + 1], last[:, None]).amax(dim=1)

@@ -3,8 +3,8 @@
     windows of N streams -> one batch through the network -> rates of each
 
 Each stream has its own window, memory and length: one can begin anew while the others go on.  The rates are those of N
-`OnlineDnSS`, to the rounding of sums, which a batch may take in another order.  Where the denoiser has a device, all
-of it lies there (`denoiser.on_device`).
+`OnlineDnSS`, to the rounding of sums, which a batch may take in another order.  Where the denoiser has a device,
+everything is there (`denoiser.on_device`).
 """
 
 from __future__ import annotations
@@ -25,10 +25,15 @@ from spikecam_env.errors import InputError
 
 
 class ManyDnSS:
-    """Denoisers like a given one, of as many streams of frames of one shape; output is the rate.
+    """Denoisers of many streams with frames of one shape; the output is the rate.
 
-    like: recipe, weights, stride, precision, unit and device; its own stream is not touched.
-    Raises InputError for a denoiser with `overlap`, and for spikes of another size.
+    Args:
+        like: gives recipe, weights, stride, precision, unit and device; its own stream is not touched.
+        streams: how many.
+        shape: (rows, columns).
+
+    Raises:
+        InputError: the denoiser has `overlap`, or spikes of another size are pushed.
     """
 
     def __init__(self, like: OnlineDnSS, streams: int, shape: tuple[int, int]) -> None:
@@ -36,21 +41,21 @@ class ManyDnSS:
             raise InputError("overlap is True; many streams are denoised by one chain of passes each, leave it False")
         self._like, self.shape = like, checked_shape(shape)
         self._count = checked_count(streams, "streams")
-        self._there = None if like.device is None else like.streams_on_device(self._count, self.shape)
-        self._chains = [self._chain() for _ in range(self._count if self._there is None else 0)]
+        self._on_device = None if like.device is None else like.streams_on_device(self._count, self.shape)
+        self._chains = [self._chain() for _ in range(self._count if self._on_device is None else 0)]
 
     def __len__(self) -> int:
         return self._count
 
     @property
     def latency(self) -> int:
-        """Frames between a frame's going in and its coming out, at most."""
+        """Frames between a frame's arrival and its output, at most."""
         return self._like.latency
 
     def restart(self, which: NDArray[np.bool_]) -> None:
         """Forget these streams (N,): others begin in their place."""
-        if self._there is not None:
-            self._there.restart(which)
+        if self._on_device is not None:
+            self._on_device.restart(which)
             return
         for stream in np.flatnonzero(which):
             self._chains[stream] = self._chain()
@@ -65,7 +70,7 @@ class ManyDnSS:
         Raises:
             InputError: where the denoiser is on a device.
         """
-        if self._there is not None or others._there is not None:
+        if self._on_device is not None or others._on_device is not None:
             raise InputError("streams on a device lie in one memory and cannot be exchanged; leave device out")
         for stream, chain in zip(np.flatnonzero(which), others._chains, strict=True):
             self._chains[stream] = chain
@@ -73,15 +78,19 @@ class ManyDnSS:
     def push(self, spikes: Any) -> list[Any]:
         """(N, K, H, W) uint8 more frames of every stream -> N times the frames (F, H, W) they complete; F may be 0.
 
-        Arrays; with a device, tensors there where `spikes` is a tensor.
+        Returns:
+            Arrays; with a device, tensors there where `spikes` is a tensor.
         """
         given = tuple(spikes.shape)
         if len(given) != 4 or given[0] != len(self) or given[2:] != self.shape:
             raise InputError(f"spikes are {given}; they must be ({len(self)}, frames, *{self.shape})")
-        if self._there is not None:
+        if self._on_device is not None:
             if isinstance(spikes, torch.Tensor):
-                return self._there.push(spikes.to(self._there.device))
-            return [infer.on_host(rate) for rate in self._there.push(torch.from_numpy(spikes).to(self._there.device))]
+                return self._on_device.push(spikes.to(self._on_device.device))
+            return [
+                infer.on_host(rate)
+                for rate in self._on_device.push(torch.from_numpy(spikes).to(self._on_device.device))
+            ]
         due = [chain.windows(chunk) for chain, chunk in zip(self._chains, spikes, strict=True)]
         done: list[list[Rates]] = [[np.empty((0, *self.shape), np.float32)] for _ in self._chains]
         for windows in _rounds(due):

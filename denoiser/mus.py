@@ -5,10 +5,10 @@ interval ends at the running minimum,
 
     end = min over t0 <= t < end of (t + ISI_t)
 
-so one predicted end a pixel suffices: lower it as planes arrive, fire in the first frame that it does not exceed, and
-start again from it.  Ends are real numbers and the fraction is carried into the next interval: rounding each end to a
-frame would make bright pixels 22 to 29 % too fast or slow (DESIGN section 7).  A spike at time t0 falls into
-frame ceil(t0), whose plane gives its first predicted end.
+so one predicted end a pixel suffices.  Lower it as planes arrive, fire in the first frame that it does not exceed, and
+start again from it.  Ends are real numbers, and the fraction is carried into the next interval: ends rounded to a frame
+would make bright pixels 22 to 29 % too fast or slow.  A spike at time t0 falls into frame ceil(t0), whose plane gives
+its first predicted end.
 """
 
 from __future__ import annotations
@@ -22,15 +22,17 @@ from denoiser.phase import starting_phase
 from spikecam_env.compiled import njit
 
 SLOWEST = 1e-4
-"""Least rate that is believed [spikes/frame]; the fastest is 1, one spike a frame."""
+"""Least rate that is believed [spikes/frame]; the greatest is 1, one spike a frame."""
 
 
 class MusState(NamedTuple):
-    """wait: (H, W) float64, time from the next frame to the predicted end [frames]; before frame 0 the share of the
-    first interval that is still to come, in (0, 1], and started is False."""
+    """The decoder's state."""
 
     wait: NDArray[np.float64]
+    """(H, W) time from the next frame to the predicted end [frames]; before frame 0 the share of the first interval
+    that is still to come, in (0, 1]."""
     started: bool
+    """False before frame 0."""
 
 
 def start(shape: tuple[int, int]) -> MusState:
@@ -39,12 +41,9 @@ def start(shape: tuple[int, int]) -> MusState:
 
 
 def step(inverse_intervals: NDArray[np.float32], state: MusState) -> tuple[NDArray[np.uint8], MusState]:
-    """(K, H, W) 1/ISI planes, cut to [SLOWEST, 1] -> (K, H, W) spikes and the state after them.
-
-    The spike before frame 0 is taken at -1 - (share over) * ISI_0.
-    """
+    """(K, H, W) 1/ISI planes, cut to [SLOWEST, 1] -> (K, H, W) spikes and the state after them."""
     wait = state.wait.copy()
-    if not state.started and len(inverse_intervals):
+    if not state.started and len(inverse_intervals):  # the spike before frame 0 is at -1 - (share over) * ISI_0
         wait = wait / np.clip(inverse_intervals[0].astype(np.float64), SLOWEST, 1.0) - 1.0
     spikes = np.empty(inverse_intervals.shape, np.uint8)
     _update(inverse_intervals, wait, spikes)

@@ -8,7 +8,7 @@
     ISI_dn = Theta ISI* + (1 - Theta) z                                 paper (21)
 
 ISI here is the normalised interval, 1/ISI in [0, 1].  The paper gives 0.27 M parameters (0.20 M without the refine
-module) and no widths; these meet both.  Input and output are (N, channels, H, W) float; H and W that 4 does not
+module) and no widths; these meet both.  Input and output are (N, channels, H, W) float.  H and W that 4 does not
 divide are extended by repeating the border, and cut again.
 """
 

@@ -29,9 +29,13 @@ INSTALL = "pip install --no-deps mmagic==1.2.0"
 
 
 def niqe(picture: NDArray[np.floating]) -> float:
-    """(H, W) picture in [0, 1], encoded for a screen -> NIQE of its 8-bit grey levels.
+    """NIQE of a picture's 8-bit grey levels.
 
-    Errors: InputError for a picture that is not (H, W), is smaller than 192 x 192, or without mmagic.
+    Args:
+        picture: (H, W) in [0, 1], encoded for a screen.
+
+    Raises:
+        InputError: the picture is not (H, W) or smaller than 192 x 192, or mmagic is missing.
     """
     grey = np.asarray(picture)
     if grey.ndim != 2 or min(grey.shape) < SMALLEST:
@@ -62,7 +66,7 @@ def _load(name: str, path: Path) -> ModuleType:
 
 
 def _stand_ins() -> dict[str, ModuleType]:
-    """What the two files import and, for grey pictures, never call."""
+    """Modules that the two files import and, for grey pictures, never call."""
 
     class Registry:
         @staticmethod

@@ -11,7 +11,8 @@ PRECISIONS = ("auto", "bfloat16", "float32")
 
 
 def number_type(precision: str, device: torch.device | None = None) -> torch.dtype:
-    """The type of a precision of PRECISIONS; "auto" is what the device, by default the processor, multiplies in."""
+    """The type of a precision of PRECISIONS; "auto" is the one in which the device, by default the processor,
+    multiplies."""
     if precision == "auto" and device is not None and device.type == "cuda":
         return torch.bfloat16 if torch.cuda.is_bf16_supported() else torch.float32
     if precision == "auto":

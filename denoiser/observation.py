@@ -29,14 +29,14 @@ from spikecam_env.types import Masks
 class Rate(Observation):
     """(1, H, W) uint8: 255 where the denoised rate is `white` or above.
 
-    mode: "best", "fast", "paper", or the path of a checkpoint (.pt).
-    white: [spikes/frame]; eight bits round what is below a 500th of it to 0.
-    Raises InputError for a white that is not above 0, and, when an episode begins, for another mode and for an unusable
-    checkpoint.
+    Raises:
+        InputError: `white` is not above 0; or, when an episode begins, the mode is unknown or its checkpoint unusable.
     """
 
     mode: str | os.PathLike[str] = "best"
+    """"best", "fast", "paper", or the path of a checkpoint (.pt)."""
     white: float = field(default=1.0, kw_only=True)
+    """[spikes/frame]; eight bits round a rate below a 500th of it to 0."""
 
     takes_tensors = True
     begins_alone = False  # on a device the windows of all streams lie in one memory
@@ -49,8 +49,8 @@ class Rate(Observation):
 
     def start(self, view: CameraView, streams: int) -> Denoising:
         if view.device is not None:
-            there = ManyDnSS(_denoiser(self.mode, str(view.device)), streams, view.shape)
-            return DenoisingThere(there, self.white, view.device)
+            many = ManyDnSS(_denoiser(self.mode, str(view.device)), streams, view.shape)
+            return DenoisingOnDevice(many, self.white, view.device)
         return Denoising(ManyDnSS(_denoiser(self.mode), streams, view.shape), self.white)
 
     def step(self, blocks: Blocks, state: Denoising) -> tuple[NDArray[np.uint8], Denoising]:
@@ -62,10 +62,8 @@ class Rate(Observation):
 
 
 class Denoising:
-    """Streams mid-way.  pushed, finished: (N,) frames that went in and that came out.
-
-    Memory of the denoiser is large, so it is changed in place: a step cannot be taken again from the state before.
-    """
+    """Streams mid-way.  The denoiser's memory is large and changed in place: no step can be taken again from the state
+    before."""
 
     def __init__(self, denoiser: ManyDnSS, white: float) -> None:
         streams, shape = len(denoiser), denoiser.shape
@@ -73,7 +71,9 @@ class Denoising:
         self._fired: Any = np.zeros((streams, *shape), np.int64)
         self._picture: Any = np.zeros((streams, 1, *shape), np.uint8)
         self.pushed = np.zeros(streams, np.int64)
+        """(N,) frames that went in."""
         self.finished = np.zeros(streams, np.int64)
+        """(N,) frames that came out."""
 
     def restarted(self, which: Masks) -> Denoising:
         """This, with these streams before their first frame."""
@@ -94,7 +94,7 @@ class Denoising:
         return self._fired, self._picture, self.pushed, self.finished
 
     def seen(self, spikes: Any) -> Any:
-        """(N, K, H, W) more frames -> (N, 1, H, W) what is seen after them."""
+        """(N, K, H, W) more frames -> (N, 1, H, W) the pictures after them."""
         self.pushed += spikes.shape[1]
         self._fired += spikes.sum(axis=1, dtype=np.int64)
         for stream, rates in enumerate(self._denoiser.push(spikes)):
@@ -105,7 +105,7 @@ class Denoising:
         return np.where((self.finished > 0)[:, None, None, None], self._picture, noisy)
 
 
-class DenoisingThere(Denoising):
+class DenoisingOnDevice(Denoising):
     """The same with tensors on a device."""
 
     def __init__(self, denoiser: ManyDnSS, white: float, device: torch.device) -> None:
@@ -114,7 +114,6 @@ class DenoisingThere(Denoising):
         self._picture = torch.from_numpy(self._picture).to(device)
 
     def seen(self, spikes: torch.Tensor) -> torch.Tensor:
-        """(N, K, H, W) more frames -> (N, 1, H, W) what is seen after them."""
         self.pushed += spikes.shape[1]
         self._fired += spikes.sum(dim=1)
         rates = self._denoiser.push(spikes)
@@ -123,11 +122,11 @@ class DenoisingThere(Denoising):
         if finish:
             newest: Any = torch.stack([rates[stream][-1] for stream in finish])
             self._picture[finish, 0] = torch.as_tensor(grey(newest / self._white))
-        pushed, there = (
+        pushed, finished = (
             torch.from_numpy(array).to(spikes.device)[:, None, None] for array in (self.pushed, self.finished)
         )
         noisy = torch.as_tensor(grey(self._fired.double() / (self._white * pushed.clamp(min=1))))[:, None]
-        return torch.where(there[:, None] > 0, self._picture, noisy)
+        return torch.where(finished[:, None] > 0, self._picture, noisy)
 
 
 def _denoiser(mode: Any, device: str | None = None) -> OnlineDnSS:

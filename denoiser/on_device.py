@@ -31,9 +31,18 @@ from spikecam_env.streams.packing import as_spikes
 class DeviceStreams:
     """N streams of frames of one shape before one network of many planes a pass.  Streams begin anew one by one.
 
-    network: on the device, as `infer.prepared` makes it.  number_type: what it computes in.  unit: calibration map.
-    replays: on CUDA, a pass of all streams is recorded once and replayed.
-    Raises InputError for a network of one plane a pass, and for a layout that `StreamWindows` cannot begin.
+    Args:
+        recipe: of the network.
+        network: on the device, as `infer.prepared` makes it.
+        number_type: in which it computes.
+        shape: (rows, columns).
+        streams: N.
+        device: of windows and network.
+        unit: calibration map.
+        replays: on CUDA, a pass of all streams is recorded once and replayed.
+
+    Raises:
+        InputError: the network has one plane a pass, or the layout is one that `StreamWindows` cannot begin.
     """
 
     def __init__(
@@ -105,7 +114,7 @@ class DeviceStreams:
         return self._on(slice(None), self._new)
 
     def _on(self, rows: Any, new: Tensor) -> Tensor:
-        """A pass; what streams remember is changed in place."""
+        """A pass; the streams' memory is changed in place."""
         windows, planes = pushed(self.layout, self._windows.rows(rows), new, self._begins[rows])
         goes_on = (windows.start > 0)[:, None, None, None]
         carried = tuple(torch.where(goes_on, before[rows], 0.0) for before in self._carried)
@@ -128,7 +137,7 @@ class DeviceStreams:
 
     @torch.inference_mode()
     def window_state(self, stream: int) -> tuple[dict[str, Any], infer.Carried]:
-        """What `RollingWindow.state` gives of a stream, and what its last pass left."""
+        """The state of a stream's window, as of `RollingWindow.state`, and the arrays that its last pass left."""
         layout, passes, waits = self.layout, int(self.passes[stream]), int(self._waits[stream])
         start = max(passes - 1, 0) * layout.planes  # of the next pass
         waiting, windows = self._waiting[stream, :waits], self._windows.rows(torch.tensor([stream], device=self.device))
@@ -145,7 +154,7 @@ class DeviceStreams:
 
     @torch.inference_mode()
     def go_on(self, state: dict[str, Any], carried: infer.Carried) -> None:
-        """The one stream that there is goes on from a state of its window, that of a `RollingWindow` too."""
+        """The one stream goes on from a state of its window, that of a `RollingWindow` too."""
         layout, start = self.layout, int(state["start"])
         self.restart(np.ones(1, bool))
         frames = torch.from_numpy(state["frames"]).to(self.device)[None]
@@ -178,10 +187,12 @@ class DeviceStreams:
 
 
 class DeviceChain:
-    """What `PassChain` is, on a device: rates are tensors there.
+    """A `PassChain` on a device: rates are tensors there.
 
-    streams: one.  host: a `PassChain` with the same network, for the state's form and a stream's last passes.
-    first: frame of the stream from which on there are passes.
+    Args:
+        streams: one.
+        host: a chain with the same network, for the state's form and a stream's last passes.
+        first: frame of the stream from which on there are passes.
     """
 
     def __init__(self, streams: DeviceStreams, host: PassChain, first: int = 0) -> None:
@@ -214,14 +225,14 @@ class DeviceChain:
             yield start, torch.from_numpy(rates).to(self._streams.device)
 
     def state(self) -> dict[str, Any]:
-        """Everything that later passes depend on, as `Chain.state` has it."""
+        """Everything on which later passes depend, as `PassChain.state` has it."""
         if self._over:
             return self._host.state()
         window, carried = self._streams.window_state(0)
         return {"window": window, "held": None, "carried": carried, "skipped": self._skipped}
 
     def restore(self, state: dict[str, Any]) -> None:
-        """Go on from `state()`; raises InputError for arrays of another size or type."""
+        """Go on from `state()`; InputError for arrays of another size or type."""
         self._host.restore(state)
         self._skipped, window = int(state["skipped"]), state["window"]
         self._over = 0 < window["start"] > window["seen"] - self._streams.layout.future
@@ -230,9 +241,14 @@ class DeviceChain:
 
 
 def spikes_on(spikes: ArrayLike | Tensor, device: torch.device) -> Tensor:
-    """(..., K, H, W) spikes, an array or a tensor anywhere, as uint8 on the device.
+    """Spikes as uint8 on a device.
 
-    Raises InputError as `as_spikes` does.
+    Args:
+        spikes: (..., K, H, W), an array or a tensor anywhere.
+        device: for the result.
+
+    Raises:
+        InputError: as `as_spikes`.
     """
     if not isinstance(spikes, Tensor):
         return torch.from_numpy(np.ascontiguousarray(as_spikes(spikes))).to(device)
@@ -241,27 +257,33 @@ def spikes_on(spikes: ArrayLike | Tensor, device: torch.device) -> Tensor:
             f"spikes are {spikes.dtype} of shape {tuple(spikes.shape)}; a stream is uint8, int8 or bool of shape "
             "(frames, rows, columns)"
         )
-    there = spikes.to(device)
-    frames = there.view(torch.uint8)
-    if there.dtype != torch.bool and bool((frames & 0xFE).any()):  # waits for the device, once
-        raise InputError(f"spikes run from {int(there.min())} to {int(there.max())}; a stream holds 0 and 1 only")
+    spikes = spikes.to(device)
+    frames = spikes.view(torch.uint8)
+    if spikes.dtype != torch.bool and bool((frames & 0xFE).any()):  # waits for the device, once
+        raise InputError(f"spikes run from {int(spikes.min())} to {int(spikes.max())}; a stream holds 0 and 1 only")
     return frames
 
 
 def unpacked_on(packed: NDArray[np.uint8] | Tensor, shape: tuple[int, int], device: torch.device) -> Tensor:
-    """(K, ceil(H W / 8)) packed frames, an array or a tensor anywhere, as (K, H, W) uint8 on the device.
+    """Packed frames as (K, H, W) uint8 on a device.
 
-    The first pixel is in the lowest bit.  Raises InputError for another width or type.
+    Args:
+        packed: (K, ceil(H W / 8)), an array or a tensor anywhere; the first pixel is in the lowest bit.
+        shape: (H, W).
+        device: for the result.
+
+    Raises:
+        InputError: the frames have another width or type.
     """
-    there = (packed if isinstance(packed, Tensor) else torch.from_numpy(np.ascontiguousarray(packed))).to(device)
+    rows = (packed if isinstance(packed, Tensor) else torch.from_numpy(np.ascontiguousarray(packed))).to(device)
     pixels = shape[0] * shape[1]
-    if there.dtype != torch.uint8 or there.ndim != 2 or there.shape[1] != -(-pixels // 8):
+    if rows.dtype != torch.uint8 or rows.ndim != 2 or rows.shape[1] != -(-pixels // 8):
         raise InputError(
-            f"packed frames are {there.dtype} of shape {tuple(there.shape)}; {shape[0]} x {shape[1]} pixels need uint8 "
+            f"packed frames are {rows.dtype} of shape {tuple(rows.shape)}; {shape[0]} x {shape[1]} pixels need uint8 "
             f"of shape (frames, {-(-pixels // 8)})"
         )
-    bits = (there[..., None] >> torch.arange(8, dtype=torch.uint8, device=device)) & 1
-    return bits.reshape(len(there), -1)[:, :pixels].reshape(-1, *shape)
+    bits = (rows[..., None] >> torch.arange(8, dtype=torch.uint8, device=device)) & 1
+    return bits.reshape(len(rows), -1)[:, :pixels].reshape(-1, *shape)
 
 
 def kept(rates: Iterator[tuple[int, Tensor]]) -> Iterator[tuple[int, Rates]]:

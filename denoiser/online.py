@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import copy
 import os
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from itertools import chain as chain_of
 from typing import Any
 
@@ -25,7 +25,6 @@ from denoiser.chain import Crossfade, PassChain, Rates
 from denoiser.given_network import check_network, has_passes
 from denoiser.number_type import PRECISIONS, number_type
 from denoiser.on_device import DeviceChain, DeviceStreams, kept, spikes_on, unpacked_on
-from denoiser.openvino_passes import OpenvinoPasses
 from denoiser.pixel_map import PixelMap
 from denoiser.recipe import Recipe
 from denoiser.weights import digest, load_weights, pretrained_path
@@ -37,12 +36,7 @@ from spikecam_env.sensor.kernels.cuda import checked_device
 from spikecam_env.streams.packing import as_spikes, unpack_frames
 
 OUTPUTS = ("spikes", "rate", "both")
-ENGINES: dict[str, Callable[[nn.Module, torch.dtype], nn.Module | infer.StreamPasses]] = {
-    "torch": infer.prepared,
-    "captured": infer.prepared,
-    "openvino": lambda network, _: OpenvinoPasses(network),
-}
-"""What computes passes, by name: of a network and the type to compute in."""
+ENGINES = ("torch", "captured")
 _DECODERS: dict[str, Any] = {"mus": mus, "accumulate": accumulate}
 
 Denoised = NDArray[Any] | tuple[NDArray[np.uint8], NDArray[np.float32]]
@@ -53,32 +47,36 @@ where the frames that went in were tensors."""
 class OnlineDnSS:
     """A denoiser of one stream; the first `push` sets the size of its frames.
 
-    output: "spikes", "rate" (the network's plane, cut to [0, 1]) or "both".
-    stride: `paper` mode only: evaluate every stride-th plane and hold it in between (faster; worse when things move).
-    precision: of the network; "auto" is bfloat16 where the processor (the GPU, with `device`) has it, else float32.
-    engine: what computes the network, "torch", or "openvino" (an optional package; `best` mode only).  Each gives the
-        same bits for any cutting of the stream; in bfloat16 their rates differ by some 4e-4 rms [spikes/frame].
-        "captured" is "torch", and on a CUDA `device` a pass is recorded once and replayed.
-    device: `best` mode only: windows, planes and network as tensors there, "cuda", "cuda:1" or "cpu"
-        (`denoiser.on_device`).  In float32 rates differ by less than 1e-5 from those without.  Spikes, and the mean of
-        `overlap`, are made of them on the host.  Default: windows on the processor, in compiled code.
-    decoder: how rates become spikes, "accumulate" (`denoiser.accumulate`) or "mus" (`denoiser.mus`, the paper's);
-        default: the recipe's.
-    unit: `best` mode only: the calibrated unit: maps (gain, dark) of shape (H, W), a `Calibration` of SNEE, the path of
-        its maps.h5, or a `PixelMap`.
-    overlap: `best` mode only: two chains of passes, half a pass apart, and their mean (`denoiser.chain`): less error,
-        no seams, twice the work.
-    network: of the recipe.  A module of another class that takes and gives the same, as `torch.compile(network)`, is
-        called as it is in training; a pass then takes longer by what `spikecam bench loop` prints.
-    The network is copied: training it further changes nothing here.  One object denoises one stream: for another stream
-    take `another()`.
-    Errors: InputError for unknown options, a network of another recipe or without finite weights, and unusable spikes;
-    NotReadyError for a push after `flush`.
+    The network is copied: training it further changes nothing here.  For another stream take `another()`.
 
-    >>> online = OnlineDnSS.pretrained("best", output="rate")
-    >>> spikes = (np.random.default_rng(0).random((64, 16, 24)) < 0.2).astype(np.uint8)
-    >>> [online.push(block).shape for block in (spikes[:32], spikes[32:])], online.flush().shape
-    ([(16, 16, 24), (32, 16, 24)], (16, 16, 24))
+    Args:
+        recipe: of the network.
+        network: of the recipe.  A module of another class that takes and gives the same, as `torch.compile(network)`,
+            is called as in training; `spikecam bench loop` prints by how much a pass is then slower.
+        output: "spikes", "rate" (the network's plane, cut to [0, 1]) or "both".
+        stride: `paper` mode only: evaluate every stride-th plane and hold it in between (faster; worse when things
+            move).
+        precision: of the network; "auto" is bfloat16 where the processor (the GPU, with `device`) has it, else float32.
+        engine: "torch", or "captured", with a `device`: on CUDA a pass is then recorded once and replayed.
+        decoder: from rates to spikes, "accumulate" (`denoiser.accumulate`) or "mus" (`denoiser.mus`, the paper's);
+            default: the recipe's.
+        unit: `best` mode only: the calibrated unit: maps (gain, dark) of shape (H, W), a `Calibration` of SNEE, the
+            path of its maps.h5, or a `PixelMap`.
+        overlap: `best` mode only: two chains of passes, half a pass apart, and their mean (`denoiser.chain`): less
+            error, no seams, twice the work.
+        device: `best` mode only: windows, planes and network as tensors there, "cuda", "cuda:1" or "cpu"
+            (`denoiser.on_device`).  In float32 rates differ by less than 1e-5 from those without.  Spikes, and the mean
+            of `overlap`, are made of them on the host.  Default: windows on the processor, in compiled code.
+
+    Raises:
+        InputError: unknown options, a network of another recipe or without finite weights, and unusable spikes.
+        NotReadyError: a push after `flush`.
+
+    Example:
+        >>> online = OnlineDnSS.pretrained("best", output="rate")
+        >>> spikes = (np.random.default_rng(0).random((64, 16, 24)) < 0.2).astype(np.uint8)
+        >>> [online.push(block).shape for block in (spikes[:32], spikes[32:])], online.flush().shape
+        ([(16, 16, 24), (32, 16, 24)], (16, 16, 24))
     """
 
     def __init__(
@@ -99,6 +97,8 @@ class OnlineDnSS:
         self.output = _checked_output(output)
         if not isinstance(precision, str) or precision not in PRECISIONS:
             raise unknown_name("precision", precision, PRECISIONS)
+        if engine == "openvino":
+            raise InputError("engine 'openvino' was removed: it was 1.06 times as fast as 'torch'; take 'torch'")
         if not isinstance(engine, str) or engine not in ENGINES:
             raise unknown_name("engine", engine, ENGINES)
         if checked_count(stride, "stride") > 1 and recipe.layout.planes > 1:
@@ -119,9 +119,9 @@ class OnlineDnSS:
             raise InputError("engine 'captured' replays passes on a device; give one, device='cuda', or take 'torch'")
         self._type = number_type(precision, self._device)
         self._engine = engine
-        self._network = ENGINES[engine](network, self._type)
+        self._network = infer.prepared(network, self._type)
         if self._device is not None:
-            self._network = _moved(self._network, engine, self._device)
+            self._network = _moved(self._network, self._device)
         self._digest = digest(recipe, network.state_dict())
         self.reset()
 
@@ -137,10 +137,8 @@ class OnlineDnSS:
         return cls(recipe, network, **options)
 
     def another(self, output: str | None = None) -> OnlineDnSS:
-        """A denoiser like this one for another stream, from its first frame; both use the same weights.
-
-        output: of the other, default this one's.
-        """
+        """A denoiser like this one for another stream, from its first frame, with the same weights; by default the same
+        output."""
         other = copy.copy(self)
         other.output = self.output if output is None else _checked_output(output)
         other.reset()
@@ -153,7 +151,7 @@ class OnlineDnSS:
 
     @property
     def latency(self) -> int:
-        """Frames between a frame's going in and its coming out, at most."""
+        """Frames between a frame's arrival and its output, at most."""
         return self._recipe.layout.latency
 
     @property
@@ -175,12 +173,19 @@ class OnlineDnSS:
         return self._device
 
     def push(self, spikes: ArrayLike | torch.Tensor) -> Denoised:
-        """(K, H, W) more spike frames, 0 or 1, K >= 0 -> the frames they complete (perhaps none)."""
+        """(K, H, W) more spike frames, 0 or 1, K >= 0 -> the frames that they complete (perhaps none)."""
         return self._pushed(spikes, as_tensors=isinstance(spikes, torch.Tensor))
 
     def push_packed(self, packed: NDArray[np.uint8] | torch.Tensor, shape: tuple[int, int]) -> Denoised:
-        """`push` of (K, ceil(H W / 8)) packed frames of `shape`, as `pack_frames` packs; to a device they go as they
-        are, and are unpacked there.  What comes out is an array where `packed` is one."""
+        """`push` of packed frames.  To a device they go as they are, and are unpacked there.
+
+        Args:
+            packed: (K, ceil(H W / 8)) as `pack_frames` packs.
+            shape: (H, W).
+
+        Returns:
+            As `push`; arrays where `packed` is an array.
+        """
         if self._device is None:
             return self.push(unpack_frames(np.asarray(packed), shape))
         return self._pushed(unpacked_on(packed, shape, self._device), as_tensors=isinstance(packed, torch.Tensor))
@@ -195,14 +200,14 @@ class OnlineDnSS:
         return self._denoise([chain.push(chunk) for chain in self._chains])
 
     def flush(self) -> Denoised:
-        """The stream is over -> its last frames, so that as many came out as went in."""
+        """End the stream -> its last frames, so that output and input have as many."""
         if not self._chains:
             raise NotReadyError("nothing was pushed yet; push spike frames first")
         self._ended = True
         return self._denoise([chain.end() for chain in self._chains])
 
     def state(self) -> dict[str, Any]:
-        """A copy of everything later frames depend on, but the weights: plain arrays and numbers, picklable."""
+        """A copy of everything on which later frames depend, but the weights: plain arrays and numbers, picklable."""
         state: dict[str, Any] = {"of": self._identity(), "shape": self.shape}
         if self._chains:
             state |= {
@@ -216,8 +221,12 @@ class OnlineDnSS:
     def restore(self, state: dict[str, Any]) -> None:
         """Go on from a copy of `state()`; the output may be another one.
 
-        Raises InputError for the state of a denoiser with other weights, recipe, stride, precision or engine, which
-        would go on differently, and for anything that is no state; this one is then as it was.
+        Args:
+            state: of a denoiser with the same weights and options.
+
+        Raises:
+            InputError: the state is of other weights, recipe, stride, precision or engine, which would go on
+                differently, or is no state.  This denoiser is then as it was.
         """
         try:
             for name, ours in self._identity().items():
@@ -233,13 +242,13 @@ class OnlineDnSS:
         except (KeyError, TypeError, AttributeError, IndexError, ValueError) as error:
             raise InputError(
                 f"the state is no whole state of a denoiser ({type(error).__name__}: {error}); "
-                "give what `OnlineDnSS.state()` returned"
+                "give the result of `OnlineDnSS.state()`"
             ) from error
         self._chains, self._mixing = other._chains, other._mixing
         self._decoding, self._ended = other._decoding, other._ended
 
     def chain(self, shape: tuple[int, int], first: int = 0) -> PassChain:
-        """Passes of this network over another stream, from its frame `first` on: for those who denoise many."""
+        """Passes of this network over another stream from frame `first` on, for a caller that denoises many."""
         self._check_map(shape)
         options: dict[str, Any] = {"unit": self._unit, "stride": self._stride, "first": first}
         return PassChain(self._recipe, self._network, self._type, shape, **options)
@@ -247,7 +256,7 @@ class OnlineDnSS:
     def streams_on_device(self, streams: int, shape: tuple[int, int]) -> DeviceStreams:
         """Passes of this network over other streams, on the device."""
         self._check_map(shape)
-        assert self._device is not None and isinstance(self._network, nn.Module)
+        assert self._device is not None
         options: dict[str, Any] = {"unit": self._unit, "replays": self._engine == "captured"}
         return DeviceStreams(self._recipe, self._network, self._type, shape, streams, self._device, **options)
 
@@ -256,7 +265,7 @@ class OnlineDnSS:
             raise InputError(f"the calibration map has shape {self._unit.gain.shape}, the stream's frames {shape}")
 
     def passes(self, windows: list[PassWindow], carried: list[infer.Carried]) -> list[tuple[Rates, infer.Carried]]:
-        """Rates of the windows of as many streams, and what each leaves, in one pass of the network."""
+        """Rates of the windows of as many streams, and the carried arrays of each, in one pass of the network."""
         return infer.rates_of_many(self._network, windows, self._type, carried)
 
     def _begin(self, shape: tuple[int, int]) -> None:
@@ -280,7 +289,7 @@ class OnlineDnSS:
         self._ended = bool(state["ended"])
 
     def _identity(self) -> dict[str, Any]:
-        """What frames depend on besides the stream."""
+        """The options and weights on which frames depend besides the stream."""
         precision = "bfloat16" if self._type == torch.bfloat16 else "float32"
         return {
             "recipe and weights": self._digest,
@@ -339,9 +348,7 @@ class OnlineDnSS:
         return chunk
 
 
-def _moved(network: nn.Module | infer.StreamPasses, engine: str, device: torch.device) -> nn.Module:
-    if not isinstance(network, nn.Module):
-        raise InputError(f"engine {engine!r} has no device; take 'torch' or 'captured', or leave device out")
+def _moved(network: nn.Module, device: torch.device) -> nn.Module:
     if not has_passes(network):
         raise InputError(
             f"a device takes networks of many planes a pass, as mode 'best' is, and no {type(network).__name__}; "
@@ -357,15 +364,25 @@ def _checked_output(output: str) -> str:
 
 
 def denoise(spikes: ArrayLike, mode: str = "best", *, chunk: int = 256, **options: Any) -> Denoised:
-    """(T, H, W) recorded spikes -> as many denoised frames; options as for `OnlineDnSS`.
+    """Denoise a recording.  The bits are those of the stream pushed piece by piece.
 
-    The same bits as pushing the stream piece by piece; it is pushed `chunk` frames at a time to save memory.
-    Raises InputError as `OnlineDnSS` does, and for a chunk that is no whole number, 1 or more.
+    Args:
+        spikes: (T, H, W) recorded.
+        mode: "best", "fast" or "paper".
+        chunk: frames that are pushed at a time, to save memory.
+        options: as for `OnlineDnSS`.
 
-    >>> spikes = (np.random.default_rng(0).random((48, 16, 24)) < 0.2).astype(np.uint8)
-    >>> rate = denoise(spikes, "best", output="rate")
-    >>> rate.shape, rate.dtype
-    ((48, 16, 24), dtype('float32'))
+    Returns:
+        T denoised frames.
+
+    Raises:
+        InputError: as `OnlineDnSS`; and for a chunk that is no whole number, 1 or more.
+
+    Example:
+        >>> spikes = (np.random.default_rng(0).random((48, 16, 24)) < 0.2).astype(np.uint8)
+        >>> rate = denoise(spikes, "best", output="rate")
+        >>> rate.shape, rate.dtype
+        ((48, 16, 24), dtype('float32'))
     """
     frames, chunk = as_spikes(spikes), checked_count(chunk, "chunk")
     online = OnlineDnSS.pretrained(mode, **options)

@@ -1,4 +1,4 @@
-"""The calibration map of a unit: what the denoiser may know of each pixel's fixed pattern.
+"""The calibration map of a unit: the fixed pattern of each pixel, as far as the denoiser may know it.
 
 SNEE measures it (`spikecam calibrate`): alpha/phi and I_dark/phi of every pixel.  The denoiser's light is in spikes a
 frame of the mean pixel, whose gain is 1, whatever the labels of the flats were in.
@@ -35,12 +35,14 @@ MOST_MEASURED = 1e30
 class PixelMap:
     """A calibrated unit: its light l fires gain * l + dark times a frame.
 
-    gain, dark: (H, W) float32; gain 0.01 to 100, relative to the mean pixel; dark [spikes/frame], 0 to 1.
-    Raises InputError for other shapes, and for values that are not finite or out of range.
+    Raises:
+        InputError: the maps have other shapes, or values that are not finite or out of range.
     """
 
     gain: NDArray[np.float32]
+    """(H, W), relative to the mean pixel, 0.01 to 100."""
     dark: NDArray[np.float32]
+    """(H, W) [spikes/frame], 0 to 1."""
 
     def __post_init__(self) -> None:
         gain, dark = (_real(value) for value in (self.gain, self.dark))
@@ -58,10 +60,14 @@ class PixelMap:
 
     @classmethod
     def of(cls, unit: Any) -> PixelMap:
-        """A map as it is; of a pair (gain, dark); of a `Calibration`; or of a maps.h5 of `spikecam calibrate`, or its
-        folder.
+        """The map of a unit.
 
-        Raises InputError for anything else.
+        Args:
+            unit: a map; a pair (gain, dark); a `Calibration`; or the path of a maps.h5 of `spikecam calibrate`, or of
+                its folder.
+
+        Raises:
+            InputError: it is none of these.
         """
         if isinstance(unit, cls):
             return unit
@@ -123,7 +129,7 @@ def _check_range(name: str, values: NDArray[np.float32], low: float, high: float
 
 
 def _real(value: Any) -> NDArray[np.float32]:
-    """As float32, infinite where that cannot hold it; raises InputError unless it is an array of real numbers."""
+    """As float32, infinite where that cannot hold it; InputError unless it is an array of real numbers."""
     try:
         array = np.asarray(value)
     except ValueError as error:

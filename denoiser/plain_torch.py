@@ -1,7 +1,7 @@
-"""Files of `torch.save` from outside, read without trusting them: numbers, text, lists, tables and plain tensors.
+"""Files of `torch.save` from outside, read without trust: numbers, text, lists, tables and plain tensors.
 
-`torch.load(weights_only=True)` runs no foreign code, but believes a file's own sizes and checks no sums.  Here every
-record's CRC is checked, and a tensor is refused that is larger than its record, sparse, or of complex or reduced type.
+`torch.load(weights_only=True)` runs no foreign code, but believes the sizes in a file and checks no sums.  Here the CRC
+of every record is checked.  A tensor is refused that is larger than its record, sparse, or of complex or reduced type.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ from spikecam_env.errors import InputError
 from spikecam_env.untrusted import existing_file
 
 LARGEST_BYTES = 1 << 30
-"""Of a file that is read; the largest that training writes has a few MB."""
+"""Largest file that is read; the largest that training writes has a few MB."""
 
 
 class _Storage(NamedTuple):
@@ -42,7 +42,11 @@ _STORAGES = {
 def read_plain(path: str | os.PathLike[str]) -> Any:
     """The value in a file of `torch.save`; its tensors are on the processor.
 
-    Raises InputError where the file is missing, damaged, foreign, or holds more than plain values.
+    Args:
+        path: of the file.
+
+    Raises:
+        InputError: the file is missing, damaged, foreign, or holds more than plain values.
     """
     source = existing_file(Path(path))
     try:
@@ -66,7 +70,7 @@ def read_plain(path: str | os.PathLike[str]) -> Any:
 
 
 def _stored(archive: zipfile.ZipFile) -> list[zipfile.ZipInfo]:
-    """Torch compresses nothing, so what is read is no larger than the file."""
+    """The records of a file.  Torch compresses nothing, so they take no more memory than the file."""
     members = archive.infolist()
     if any(info.compress_type != zipfile.ZIP_STORED or info.file_size != info.compress_size for info in members):
         raise ValueError("it is compressed")
@@ -115,19 +119,19 @@ def _tensor(storage: Any, offset: Any, shape: Any, strides: Any, *_: Any) -> Ten
 
 
 def tensors_like(expected: dict[str, Tensor], found: Any, where: str) -> dict[str, Tensor]:
-    """`found`; raises InputError unless it has tensors of the same names, shapes and types, all finite."""
+    """The `found` tensors; InputError unless they have the names, shapes and types of `expected`, and are finite."""
     names = set(found) if isinstance(found, dict) else set()
     if not isinstance(found, dict) or names != set(expected):
         differ = sorted(map(str, names ^ set(expected)))[:3]
         raise InputError(f"{where} holds weights of another network ({', '.join(differ)[:120]} differ); train again")
     for name, tensor in expected.items():
-        there = found[name]
-        kind = f"{there.dtype} {tuple(there.shape)}" if isinstance(there, Tensor) else type(there).__name__
+        given = found[name]
+        kind = f"{given.dtype} {tuple(given.shape)}" if isinstance(given, Tensor) else type(given).__name__
         if kind != f"{tensor.dtype} {tuple(tensor.shape)}":
             raise InputError(
                 f"{where} holds weights of another network ({name} is {kind}, here {tuple(tensor.shape)}); train again"
             )
-        if not bool(torch.isfinite(there).all()):
+        if not bool(torch.isfinite(given).all()):
             raise InputError(
                 f"{where}: {name} is not finite; the file is damaged or its training went wrong: train again"
             )

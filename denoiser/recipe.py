@@ -1,4 +1,4 @@
-"""The modes: which network sees which window, what it learns, and how its rates become spikes again."""
+"""The modes: the window and network of each, its target in training, and its decoder from rates to spikes."""
 
 from __future__ import annotations
 
@@ -19,14 +19,17 @@ from spikecam_env.untrusted import Declared, declared
 
 @dataclass(frozen=True)
 class Recipe:
-    """target: what the network is taught.  decoder: `denoiser.mus` or `denoiser.accumulate`.  refine: of `paper`.
-    channels: of a network of many planes (`stream_network.StreamDnSS`)."""
+    """Network, window, target and decoder of a mode."""
 
     layout: WindowLayout
     target: str
+    """The quantity that the network learns, "light" or "clean_inverse_interval"."""
     decoder: str
+    """"mus" (`denoiser.mus`) or "accumulate" (`denoiser.accumulate`)."""
     refine: bool = True
+    """Whether `paper` has its refine module."""
     channels: tuple[int, int, int] = CHANNELS
+    """Of a network of many planes (`stream_network.StreamDnSS`)."""
 
     def network(self) -> nn.Module:
         """The untrained network: (N, span, H, W) spikes, (N, layers, H, W) planes -> (N, planes, H, W) rates."""
@@ -36,7 +39,7 @@ class Recipe:
         return StreamDnSS(layout.span, layout.layers, layout.planes, layout.means, self.channels)
 
     def carries(self, shape: tuple[int, int]) -> tuple[tuple[int, int, int], ...]:
-        """Shapes of what a pass leaves for the next, for frames of `shape`."""
+        """Shapes of the arrays that a pass leaves for the next, for frames of `shape`."""
         if self.layout.planes == 1:
             return ()
         height, width = (n + -n % 4 for n in shape)
@@ -50,10 +53,10 @@ class Recipe:
 
     @classmethod
     def from_dict(cls, data: Any, where: str = "recipe") -> Recipe:
-        """The inverse of `to_dict`; raises InputError for anything else.  where: begins the error's text."""
-        found = declared(_DeclaredRecipe, data, where)
-        layout = WindowLayout(**found.layout.model_dump())
-        return cls(layout, found.target, found.decoder, found.refine, found.channels)
+        """The inverse of `to_dict`; InputError for anything else, whose text `where` begins."""
+        plain = declared(_DeclaredRecipe, data, where)
+        layout = WindowLayout(**plain.layout.model_dump())
+        return cls(layout, plain.target, plain.decoder, plain.refine, plain.channels)
 
 
 def _none_or_some(memory: float) -> float:
@@ -104,7 +107,7 @@ def recipe_of(mode: str) -> Recipe:
 
 
 def checked_channels(channels: Sequence[int]) -> tuple[int, int, int]:
-    """Channels of a network of many planes; raises InputError unless they are three whole numbers in range."""
+    """Channels of a network of many planes; InputError unless they are three whole numbers in range."""
     if isinstance(channels, str) or not isinstance(channels, Sequence) or len(channels) != 3:
         raise InputError(f"channels is {shown(channels)}; it must be three numbers, as (64, 128, 24)")
     half, quarter, head = (checked_whole(count, "channels", 1, MOST_CHANNELS) for count in channels)

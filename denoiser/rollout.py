@@ -1,8 +1,8 @@
-"""Training `best` along streams: the network meets what it will meet online, its own past included.
+"""Training `best` along streams: the network meets its own past, as it will online.
 
-A step takes some of many simulated streams on by a few passes, each with what the pass before carried on and with the
-gain that the network found, and adds up the losses of the passes; gradients reach back through these passes.  Where
-the streams then are, the next step that takes them goes on.
+A step takes some of many simulated streams on by a few passes.  Each pass has the hidden picture of the pass before and
+the gain from the network's own rates.  The losses of the passes are added up, and gradients reach back through them.
+The next step that takes these streams goes on where they are.
 
     loss = mean (rate - light)^2 / (rate + OFFSET)            the divisor is not differentiated: no bias
          + STEADY mean (step of rate - step of light)^2 / (rate + OFFSET)
@@ -10,9 +10,9 @@ the streams then are, the next step that takes them goes on.
 
 The light divides as its count noise does, so that dim scenes count.
 
-A small network may learn the rates of a larger one that sees the same (its teacher) instead of the light.  What nobody
-can know of the light from the spikes is not in those rates, so that a short training suffices.  Source: Hinton et al.,
-"Distilling the knowledge in a neural network", 2015.
+A small network may learn the rates of a larger one with the same input (its teacher) instead of the light.  The part of
+the light that nobody can know from the spikes is not in those rates, so that a short training suffices.  Source: Hinton
+et al., "Distilling the knowledge in a neural network", 2015.
 """
 
 from __future__ import annotations
@@ -49,37 +49,39 @@ POOL = 16
 
 
 class Pass(NamedTuple):
-    """One pass of N streams.
-
-    rate, wanted: (N, planes, H, W) [spikes/frame], of the network, and the light or the rate of its teacher.
-    before: (N, 2, H, W), the last rate and what was wanted of the pass before; of a stream's first pass the first of
-    this one.  planes: (N, layers, H, W), what the network saw.
-    valid, mapped: (N,) float32, 1 where the pass counts, and where the unit is calibrated, else 0.
-    """
+    """One pass of N streams."""
 
     rate: Tensor
+    """(N, planes, H, W) of the network [spikes/frame]."""
     wanted: Tensor
+    """(N, planes, H, W) the light, or the rate of its teacher [spikes/frame]."""
     before: Tensor
+    """(N, 2, H, W) the last rate and the last target of the pass before; of a stream's first pass the first of this
+    one."""
     planes: Tensor
+    """(N, layers, H, W) the network's input beside the spikes."""
     valid: Tensor
+    """(N,) float32, 1 where the pass counts, else 0."""
     mapped: Tensor
+    """(N,) float32, 1 where the unit is calibrated, else 0."""
 
 
 @dataclass
 class _Past:
-    """What a stream brings to its next pass besides its windows.
-
-    light: (N, planes, H, W), of the frames that came last.  last: (N, 1, H, W), hidden: (N, CARRY, H/2, W/2), what the
-    network carried on.  final: (N, 2, H, W), the last rate and what was wanted of the pass before.
-    its_last, its_hidden: what the teacher carried on; without one they have no channels.
-    """
+    """Arrays that a stream brings to its next pass besides its windows."""
 
     light: Tensor
+    """(N, planes, H, W) of the last frames."""
     last: Tensor
+    """(N, 1, H, W), carried by the network."""
     hidden: Tensor
+    """(N, CARRY, H/2, W/2), carried by the network."""
     final: Tensor
+    """(N, 2, H, W) the last rate and the last target of the pass before."""
     its_last: Tensor
+    """As `last`, of the teacher; without one it has no channels."""
     its_hidden: Tensor
+    """As `hidden`, of the teacher."""
 
     @classmethod
     def begin(cls, layout: WindowLayout, streams: int, patch: int, device: torch.device, taught: bool) -> _Past:
@@ -92,9 +94,19 @@ class _Past:
 class Rollouts:
     """Simulated streams before a network of this layout, taken in turn.
 
-    taken: streams a step.  pool: streams for each of them.  patch: their side [pixels].  seed: everything follows from
-    it.  bank, compiled: as for `SimulatedStreams`.  teacher: a network of the same layout, whose rates are wanted
-    instead of the light.  Raises InputError for a layout that `StreamWindows` cannot begin.
+    Args:
+        layout: of the windows.
+        taken: streams a step.
+        patch: their side [pixels].
+        device: of streams and windows.
+        seed: everything follows from it.
+        pool: streams for each one of a step.
+        bank: as for `SimulatedStreams`.
+        compiled: as for `SimulatedStreams`.
+        teacher: a network of the same layout, whose rates are the target instead of the light.
+
+    Raises:
+        InputError: `StreamWindows` cannot begin the layout.
     """
 
     def __init__(
@@ -130,8 +142,16 @@ class Rollouts:
 
     @torch.no_grad()
     def errors(self, network: nn.Module, passes: int) -> dict[str, float]:
-        """Mean squared errors over some streams' passes: of the network without a map ("network") and with one
-        ("mapped"); without one, of 1/ISI ("interval") and of the running mean of the shortest memory ("mean")."""
+        """Mean squared errors over some streams' passes, against the light.
+
+        Args:
+            network: that is judged.
+            passes: how many.
+
+        Returns:
+            Of the network without a map ("network") and with one ("mapped"); without one, of 1/ISI ("interval") and of
+            the running mean of the shortest memory ("mean").
+        """
         names = ("network", "mapped", "interval", "mean")
         sums, counts = torch.zeros(4, device=self.streams.device), torch.zeros(4, device=self.streams.device)
         for rate, light, _, planes, valid, mapped in self._passes(network, passes):

@@ -1,4 +1,4 @@
-"""A run of training that can go on where it was stopped: what learns, its optimiser, and how far it is.
+"""A run of training that can go on where it was stopped: network, optimiser, and progress.
 
 `last.pt` holds them as plain values; reading it checks every name, shape, type and number before anything is used.
 """
@@ -21,15 +21,18 @@ from spikecam_env.untrusted import Declared, Name, Whole, declared
 
 @dataclass
 class Run:
-    """network: what learns; several that learn together are one `nn.ModuleDict`.  seconds: spent so far.  curve: the
-    validations.  resumed_at: steps."""
+    """A run mid-way."""
 
     network: nn.Module
+    """It learns; several that learn together are one `nn.ModuleDict`."""
     optimiser: torch.optim.Optimizer
     step: int
     seconds: float
+    """Spent so far."""
     curve: list[dict[str, float]]
+    """The validations."""
     resumed_at: list[int]
+    """Steps at which the run was resumed."""
 
     @classmethod
     def begin(cls, network: nn.Module) -> Run:
@@ -57,7 +60,7 @@ class Run:
         write_whole(path, parts | progress)
 
     def load(self, path: Path) -> None:
-        """Go on from a file of `save`.  Raises InputError where it is damaged, or of another network."""
+        """Go on from a file of `save`; InputError where it is damaged, or of another network."""
         data = read_plain(path)
         try:
             if not isinstance(data, dict) or not {"network", "optimiser"} <= set(data):
@@ -80,12 +83,12 @@ class Run:
         return moments
 
     def _settings(self) -> list[dict[str, Any]]:
-        """Of the optimiser, but for what depends on the device or changes from step to step."""
+        """Of the optimiser, but for those that depend on the device or change from step to step."""
         groups = self.optimiser.state_dict()["param_groups"]
         return [{name: v for name, v in group.items() if name not in ("lr", "capturable")} for group in groups]
 
     def _refuse_others(self, found: Any, where: str) -> None:
-        """Raises InputError unless these are moments of an Adam of the same parameters and settings."""
+        """InputError unless these are moments of an Adam of the same parameters and settings."""
         if not isinstance(found, dict) or found.get("settings") != self._settings():
             raise InputError(f"{where}: the optimiser has other settings or parameters")
         weights = [p.detach().cpu() for p in self.network.parameters()]

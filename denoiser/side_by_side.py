@@ -1,4 +1,4 @@
-"""What a pass of the network sees, pixel by pixel: its spikes, planes and last rate lie side by side in memory.
+"""The input of a pass of the network, pixel by pixel: spikes, planes and last rate lie side by side in memory.
 
 Convolutions want their input so (channels last).  Torch would make it in four copies, a fifth of a pass; this is one.
 """
@@ -30,9 +30,13 @@ def side_by_side(
     number_type: torch.dtype,
     multiple: int,
 ) -> Tensor:
-    """(N, channels, H', W') of spikes, planes and last rate, in bfloat16 or float32, channels last in memory.
+    """The input of a pass: (N, channels, H', W') of spikes, planes and last rate, channels last in memory.
 
-    last: (1, H, W) each; None is 0.  H', W': H and W extended to a multiple by repeating the border.
+    Args:
+        windows: of N streams.
+        last: (1, H, W) the last rate of each; None is 0.
+        number_type: bfloat16 or float32.
+        multiple: H' and W' are H and W, extended to a multiple of it by repeating the border.
     """
     layers, height, width = windows[0].planes.shape
     span, one = len(windows[0].spikes), _ONE[number_type]

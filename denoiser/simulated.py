@@ -79,15 +79,14 @@ CONTRAST = (2.0, 50.0)
 
 @dataclass(frozen=True)
 class StreamBlock:
-    """The next frames of all streams (or of those asked for).
-
-    spikes: of each twin that is simulated, (B, K, H, W) uint8, 0 or 1.  light: (B, K, H, W) float32 in [0, 1], each
-    frame's mean [spikes/frame].  begins: (B,) bool, whether the stream began anew with the first of these frames.
-    """
+    """The next frames of all streams, or of some."""
 
     spikes: dict[str, Tensor]
+    """By twin, (B, K, H, W) uint8, 0 or 1."""
     light: Tensor
+    """(B, K, H, W) float32 in [0, 1], each frame's mean [spikes/frame]."""
     begins: Tensor
+    """(B,) bool, whether the stream began anew with the first of these frames."""
 
     @property
     def noisy(self) -> Tensor:
@@ -102,17 +101,18 @@ class StreamBlock:
 
 @dataclass(frozen=True)
 class Bank:
-    """What streams are drawn from, on one device.
-
-    textures: (N, size, size) float32 in [0, 1].  gain, dark [grains/frame], spread [grains]: (U, H, W) float32.
-    polynomial: (U, 8) float32, shape of a spike's noise (`kernels.fast.PixelLaw`).
-    """
+    """Textures and units from which streams are drawn, on one device."""
 
     textures: Tensor
+    """(N, size, size) float32 in [0, 1]."""
     gain: Tensor
+    """(U, H, W) float32, at light 1 [grains/frame]."""
     dark: Tensor
+    """(U, H, W) float32 [grains/frame]."""
     spread: Tensor
+    """(U, H, W) float32 [grains]."""
     polynomial: Tensor
+    """(U, 8) float32, shape of a spike's noise (`kernels.fast.PixelLaw`)."""
 
     @classmethod
     def drawn(
@@ -125,10 +125,16 @@ class Bank:
         streams: int | None = None,
         progress: bool = False,
     ) -> Bank:
-        """Everything follows from the seed, and from how many are drawn.
+        """A bank; everything follows from the seed, and from how many are drawn.
 
-        textures, units: how many.  pictures: (n, size, size) in [0, 1], textures besides.  streams: that are drawn in
-        all; a bank for so few holds no more units, nor more textures than a layer each.  progress: shows a bar.
+        Args:
+            seed: of textures and units.
+            device: of the bank.
+            textures: how many.
+            units: how many.
+            pictures: (n, size, size) in [0, 1], textures besides.
+            streams: drawn in all; a bank for so few holds no more units, nor more textures than a layer each.
+            progress: shows a bar.
         """
         if streams is not None:
             textures, units = min(textures, streams * (SHAPES + 1)), min(units, streams)
@@ -156,14 +162,21 @@ class Bank:
 
 
 class SimulatedStreams:
-    """`count` streams of patch x patch pixels that go on from call to call.
-
-    device: where they are.  seed: everything follows from it.  bank: default, drawn from the seed.
-    compiled: the light by `torch.compile` (a GPU's kernels are then few; other rounding).
-    twins: which spikes are simulated; the same bits whether the other is or not.
+    """Streams of patch x patch pixels that go on from call to call.
 
     After the start only `advance` changes anything, and in place (`denoiser.captured`).
-    Raises InputError for a patch that is larger than the bank's units.
+
+    Args:
+        count: how many.
+        patch: side of a stream [pixels].
+        device: of the streams.
+        seed: everything follows from it.
+        bank: default, drawn from the seed.
+        compiled: the light by `torch.compile` (a GPU's kernels are then few; other rounding).
+        twins: the spikes that are simulated, of TWINS; the same bits whether the other is or not.
+
+    Raises:
+        InputError: the patch is larger than the bank's units.
     """
 
     def __init__(
@@ -272,7 +285,7 @@ class SimulatedStreams:
         return brightest[:, None, None] * levels
 
     def _velocity(self, speed: Tensor) -> Tensor:
-        """Of each layer of scenes with this speed of the fastest, (B, layers, 2), along x and y [pixels/frame]."""
+        """Of each layer of scenes whose fastest layer has this speed, (B, layers, 2), along x and y [pixels/frame]."""
         count = len(speed)
         moves = self._uniform(0, 1, count, SHAPES + 1) >= STILL_SHAPE
         moves[:, 0] = self._uniform(0, 1, count) >= STILL_BACKGROUND
@@ -363,7 +376,7 @@ def _background(textures: Tensor, layer: dict[str, Tensor], times: Tensor, size:
 
 
 def _over(picture: Tensor, textures: Tensor, layer: dict[str, Tensor], times: Tensor) -> Tensor:
-    """A shape over what is behind it; its world is a torus somewhat larger than the picture."""
+    """A shape over the picture behind it; its world is a torus somewhat larger than the picture."""
     size = picture.shape[-1]
     reach = (torch.hypot(layer["extent"][:, 0], layer["extent"][:, 1]) + 2)[:, None, None]
     place = torch.remainder(_place(layer, times) + reach, size + 2 * reach) - reach

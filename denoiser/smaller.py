@@ -1,14 +1,14 @@
 """A smaller network from a trained larger one, as a beginning for its training (`spikecam train --start`).
 
-Each layer keeps the channels that explain most of all its channels, and the convolutions after it are corrected for
-those that it lost:
+Each layer keeps the channels that explain most of all its channels, one after the other.  The convolutions after it are
+corrected for those that it lost:
 
-    kept      one after the other, whichever explains most of the covariance that is left        pivoted Cholesky
-    a ~ B a[kept] + c                                                                              least squares
-    W a + b ~ (W B) a[kept] + (b + W c)                                                            the convolution after
+    kept      explains most of the covariance that is left      pivoted Cholesky
+    a ~ B a[kept] + c                                            least squares
+    W a + b ~ (W B) a[kept] + (b + W c)                          the convolution after
 
-a: the layer's channels, over the pixels of some streams.  For the choice each channel has the weight of what the next
-convolutions make of it.  Source of the idea: Luo et al., "ThiNet", ICCV 2017; choice and correction here are in closed
+a: the layer's channels, over the pixels of some streams.  For the choice each channel has the weight that the next
+convolutions give it.  Source of the idea: Luo et al., "ThiNet", ICCV 2017; choice and correction here are in closed
 form.
 """
 
@@ -32,22 +32,24 @@ Weights = dict[str, Tensor]
 
 @dataclass(frozen=True)
 class _Seen:
-    """Channels where some convolutions read them.
-
-    module: gives them out.  readers: convolutions.  first: of a reader's inputs, the first of these channels.
-    """
+    """Channels where some convolutions read them."""
 
     module: str
+    """Gives them out."""
     readers: tuple[str, ...]
+    """Convolutions."""
     first: int = 0
+    """Of a reader's inputs, the first of these channels."""
 
 
 @dataclass(frozen=True)
 class _Layer:
-    """Channels that must be kept together.  size: 0, 1, 2 as in `channels`.  makers: convolutions that make them."""
+    """Channels that must be kept together."""
 
     size: int
+    """0, 1, 2 as in `channels`."""
     makers: tuple[str, ...]
+    """Convolutions that make them."""
     seen: tuple[_Seen, ...]
 
 
@@ -77,9 +79,12 @@ class _Moments:
 
 
 def narrowed(network: StreamDnSS, channels: tuple[int, int, int], run: Callable[[nn.Module], object]) -> StreamDnSS:
-    """The network with fewer channels: at half and at quarter resolution, and of the head; float32, on the processor.
+    """The network with fewer channels; float32, on the processor.
 
-    run: has the network compute on frames such as it is for.
+    Args:
+        network: trained.
+        channels: at half and at quarter resolution, and of the head.
+        run: has the network compute on typical frames.
     """
     layers = _layers(network)
     moments = _moments(network, (seen.module for layer in layers for seen in layer.seen), run)
@@ -92,7 +97,7 @@ def narrowed(network: StreamDnSS, channels: tuple[int, int, int], run: Callable[
 
 
 def without_refine(network: DnSS) -> DnSS:
-    """`paper` without its refine module: the layers after it read what is left."""
+    """`paper` without its refine module: the layers after it read the other channels."""
     spikes = network.stem[0][0]  # type: ignore[index]
     small = DnSS(window=spikes.in_channels, refine=False)
     weights = {name: value for name, value in network.state_dict().items() if name in small.state_dict()}
@@ -126,7 +131,7 @@ def _layers(network: StreamDnSS) -> list[_Layer]:
 
 
 def _moments(network: nn.Module, modules: Iterable[str], run: Callable[[nn.Module], object]) -> dict[str, _Moments]:
-    """Of what these modules give out while `run` has the network compute."""
+    """Of the outputs of these modules while `run` has the network compute."""
     found = {name: _Moments() for name in modules}
     hooks = [
         network.get_submodule(name).register_forward_hook(lambda _m, _in, out, of=of: of.add(out))
@@ -179,7 +184,7 @@ def most_telling(covariance: Tensor, count: int) -> Tensor:
 
 
 def _weighed(weights: Weights, seen: _Seen, covariance: Tensor) -> Tensor:
-    """The covariance of what the readers make of each channel: each channel times the norm of its weights there."""
+    """The covariance with each channel times the norm of its weights in the readers."""
     size = len(covariance)
     squares = sum(
         _inputs_first(weights, reader)[seen.first : seen.first + size].flatten(1).square().sum(dim=1)
@@ -201,6 +206,6 @@ def _set_inputs_first(weights: Weights, name: str, value: Tensor) -> None:
 
 
 def _bias(weights: Weights, name: str, mine: Tensor, constant: Tensor) -> Tensor:
-    """What constant channels (C,) add to the outputs; of `up`, whose outputs see one input each, the mean of four."""
+    """The effect of constant channels (C,) on the outputs; a mean of four for `up`, whose outputs see one input."""
     over = mine.mean(dim=(2, 3)) if name == "up" else mine.sum(dim=(2, 3))
     return constant @ over

@@ -1,11 +1,14 @@
-"""The recurrent network of `best` mode: one pass gives the rate in 16 consecutive frames, and what the next pass gets.
+"""The recurrent network of `best` mode: one pass gives the rate in 16 consecutive frames, and the input of the next
+pass.
 
     joined, carried' = body(fold [spikes, planes, last], carried)          half resolution, a U-Net of one level
     rate = unfold(out(joined)) + head([unfold(out(joined)), planes])       [spikes/frame]
 
-Where the unit is calibrated, the running means hold more than any window, as long as nothing moves: the head then says
-for each mean how much of the rate it is, and the rest is the rate above.  The folding of 2 x 2 pixels into channels and
-the 1 x 1 convolution after it are one 2 x 2 convolution of stride 2.
+Where the unit is calibrated, the running means hold more than any window, as long as nothing moves.  The head then
+gives
+each mean its share of the rate, and the rest is the rate above.  The folding of 2 x 2 pixels into channels and the 1 x
+1
+convolution after it are one 2 x 2 convolution of stride 2.
 
 Carried from pass to pass: `last`, the rate in the last frame of the pass before, (N, 1, H, W), and a hidden picture
 (N, CARRY, H/2, W/2) in [-1, 1]; nothing (None) before the first.  (N, channels, H, W) in and out; sizes that 4 does not
@@ -52,8 +55,12 @@ class Residual(nn.Module):
 class StreamDnSS(nn.Module):
     """(N, span, H, W) spikes, (N, layers, H, W) planes, carried -> (N, planes, H, W) rates [spikes/frame], carried.
 
-    means: which of the layers are running means (first, last + 1).  The last layer is 1 where the unit is calibrated.
-    channels: at half and at quarter resolution, and of the head.
+    Args:
+        span: frames of the window.
+        layers: rate planes of the input; the last is 1 where the unit is calibrated.
+        planes: rates of a pass.
+        means: the layers that are running means (first, last + 1).
+        channels: at half and at quarter resolution, and of the head.
     """
 
     def __init__(
@@ -97,11 +104,14 @@ class StreamDnSS(nn.Module):
         return rate, (rate[:, -1:].clamp(0.0, 1.0), kept)
 
     def passed(self, seen: Tensor, beside: Tensor, hidden: Tensor, planes: Tensor | None) -> tuple[Tensor, Tensor]:
-        """The rate (N, planes, H, W) and what is to be hidden, float32, of sizes that 4 divides.
+        """The rate (N, planes, H, W) and the next hidden picture, float32, of sizes that 4 divides.
 
-        seen: (N, span + layers + 1, H, W) spikes, planes and `last`.  beside: without the spikes, for the head.
-        planes: as float32; None where no unit of these is calibrated, so that the means have no share: the same bits
-        for less work.
+        Args:
+            seen: (N, span + layers + 1, H, W) spikes, planes and `last`.
+            beside: the same without the spikes, for the head.
+            hidden: (N, CARRY, H/2, W/2).
+            planes: as float32; None where no unit is calibrated, so that the means have no share: the same bits for
+                less work.
         """
         fine = self.fine(self.mix(joint(self.stem(seen), hidden.to(seen.dtype))))
         joined = self.join(joint(self.up(self.coarse(fine)), fine))

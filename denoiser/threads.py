@@ -24,20 +24,21 @@ _NAME = "denoiser-after-fork"
 
 
 def where_torch_can(work: Callable[[], T]) -> T:
-    """What `work` returns or raises; done here unless this process may be forked.
+    """Do torch's work here, or on a thread of its own where this process may be forked; `torch.set_num_threads` holds.
 
-    `torch.set_num_threads` of the caller holds.
+    Args:
+        work: its result is returned, and its exception raised.
     """
     if not may_be_forked() or threading.current_thread().name.startswith(_NAME):
         return work()
     threads = torch.get_num_threads()
 
-    def there() -> T:
+    def on_thread() -> T:
         if torch.get_num_threads() != threads:
             torch.set_num_threads(threads)
         return work()
 
-    return _thread(os.getpid()).submit(there).result()
+    return _thread(os.getpid()).submit(on_thread).result()
 
 
 @lru_cache(maxsize=1)

@@ -13,7 +13,6 @@ In `out` the run keeps `<mode>.pt` (weights), `last.pt` (to resume), `curve.json
 from __future__ import annotations
 
 import math
-import os
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, replace
@@ -23,7 +22,7 @@ from typing import Any, Protocol
 import torch
 from torch import Tensor, nn
 
-from denoiser.captured import captured, checked_compiler
+from denoiser.captured import captured
 from denoiser.interval_training import IntervalWindows
 from denoiser.network import DnSS
 from denoiser.recipe import Recipe, checked_channels, recipe_of
@@ -33,97 +32,50 @@ from denoiser.simulated import Bank, SimulatedStreams
 from denoiser.smaller import narrowed, without_refine
 from denoiser.stream_network import StreamDnSS
 from denoiser.training_loop import RUN_FILE, learn, save_progress
+from denoiser.training_options import TrainingOptions
 from denoiser.training_record import training_record
 from denoiser.weights import load_weights, save_weights
 from spikecam_env.errors import InputError
 from spikecam_env.run_folder import run_folder
-from spikecam_env.sensor.kernels.cuda import checked_device
 from spikecam_env.torch_settings import torch_settings
 
 VALIDATION_SEED = 1_000_003  # added to the seed: other scenes, other units, other textures of the same kinds
 VALIDATION_STREAMS = 8
 NARROWING_PASSES = 16
-"""Passes of so many streams on which the channels of a larger network are looked at, where a smaller one begins."""
+"""Passes of VALIDATION_STREAMS streams from which the channels of a larger network are chosen for a smaller one."""
 PASSES = {"light": 3, "clean_inverse_interval": 1}
-"""Passes of each stream that a step takes, by what the network learns."""
-
-_COUNTS = {
-    "steps": (1, 10**9),
-    "batch": (1, 65_536),
-    "seed": (0, 2**62),
-    "threads": (1, 1024),
-    "patch": (16, 128),
-    "validate_every": (1, 10**9),
-    "validate_passes": (1, 10**6),
-}
-"""Options that are whole numbers, with the least and the most."""
-
-_AMOUNTS = {"lr": 1.0, "minutes": 1e6, "save_every_s": 1e9}
-"""Options that are numbers above 0, with the most."""
+"""Passes of each stream in a step, by the network's target."""
 
 
 @dataclass(frozen=True)
-class TrainConfig:
-    """mode: "best" | "fast" | "paper".  out: folder.  The run ends after `steps`, or `minutes` where that is given.
-
-    batch: streams a step.  patch: their side [pixels], a multiple of 16.  lr: highest rate of learning.
-    validate_every: steps between validations.  validate_passes: passes of each validation along its streams.
-    threads: of the processor.  device: where streams and network are; a GPU wants larger batches.
-    refine: `paper` with its refine module or, for the ablation, without.
-    channels: of `best` and `fast`, as `stream_network.StreamDnSS` has them: fewer are faster, and less accurate.  None:
-    the mode's.
-    start: weights of the same mode to begin from, a file of this training or a mode's name for those that ship; of a
-    network with more channels, or with the refine module, what matters most (`smaller`).
-    resume: go on from out/last.pt.
-    teacher: not of `paper`, weights whose rates the network is to learn, a file or "best", instead of the light.
-    compiled: the simulated light by `torch.compile`, on a processor too; a GPU always does.
-    """
+class TrainConfig(TrainingOptions):
+    """Options of a denoiser's training."""
 
     mode: str = "best"
-    out: Path = Path("training")
-    steps: int = 20_000
-    batch: int = 16
-    seed: int = 0
-    threads: int = 1
-    resume: bool = True
-    minutes: float | None = None
-    patch: int = 64
-    lr: float = 1e-3
+    """"best", "fast" or "paper"."""
     refine: bool = True
+    """`paper` with its refine module or, for the ablation, without."""
     channels: tuple[int, int, int] | None = None
-    save_every_s: float = 60.0
-    validate_every: int = 1000
+    """Of `best` and `fast`, as `stream_network.StreamDnSS` has them: fewer are faster, and less accurate.  None: the
+    mode's."""
     validate_passes: int = 24
-    device: str = "cpu"
+    """Passes of each validation along its streams."""
     start: str | None = None
+    """Weights of the same mode to begin from: a file of this training, or a mode's name for those that ship.  A network
+    with more channels, or with the refine module, is made smaller (`smaller`)."""
     teacher: str | None = None
-    compiled: bool = False
+    """Not of `paper`: weights whose rates the network is to learn instead of the light, a file or "best"."""
+
+    counts = TrainingOptions.counts | {"patch": (16, 128), "validate_passes": (1, 10**6)}
+    flags = ("resume", "refine", "compiled")
 
     def __post_init__(self) -> None:
         recipe_of(self.mode)
-        for name, (least, most) in _COUNTS.items():
-            value = getattr(self, name)
-            if not isinstance(value, int) or isinstance(value, bool) or not least <= value <= most:
-                raise InputError(f"{name} is {value!r}; it must be a whole number from {least} to {most}")
-        for name, highest in _AMOUNTS.items():
-            amount = getattr(self, name)
-            if name == "minutes" and amount is None:
-                continue
-            if not isinstance(amount, int | float) or isinstance(amount, bool) or not 0 < amount <= highest:
-                raise InputError(f"{name} is {amount!r}; it must be a number above 0, at most {highest:g}")
-        for name in ("resume", "refine", "compiled"):
-            if not isinstance(getattr(self, name), bool):
-                raise InputError(f"{name} is {getattr(self, name)!r}; it must be True or False")
+        super().__post_init__()
         if self.patch % 16:
             raise InputError(f"patch is {self.patch}; it must be a multiple of 16")
         if self.channels is not None:
             object.__setattr__(self, "channels", checked_channels(self.channels))
-        if not isinstance(self.out, str | os.PathLike):
-            raise InputError(f"out is {self.out!r}; it must be the path of a folder")
-        object.__setattr__(self, "out", Path(self.out))
-        checked_device(self.device, "train with --device cpu")
-        if self.compiled:
-            checked_compiler(self.device)
         for name in ("start", "teacher"):
             given = getattr(self, name)
             if given is not None and not isinstance(given, str):
@@ -135,8 +87,13 @@ class TrainConfig:
 def train(config: TrainConfig, *, progress: bool = True) -> Path:
     """Train, or go on training; returns the path of the weights.
 
-    Raises InputError where another run is at work in `out`, or it holds the run of another mode, or a damaged one, and
-    where `start` is of another network.
+    Args:
+        config: options.
+        progress: shows a bar.
+
+    Raises:
+        InputError: another run is at work in `out`; it holds the run of another mode, or a damaged one; `start` is of
+            another network.
     """
     with run_folder(config.out, "a run of training"), torch_settings(config.threads, config.seed):
         return _trained(config, progress)
@@ -179,7 +136,7 @@ def _trained(config: TrainConfig, progress: bool) -> Path:
 
 
 class TrainingSource(Protocol):
-    """What a network learns from and is judged by."""
+    """Streams from which a network learns, and by which it is judged."""
 
     streams: SimulatedStreams
 
@@ -187,7 +144,7 @@ class TrainingSource(Protocol):
         """The loss of one step, with gradients."""
 
     def errors(self, network: nn.Module, passes: int) -> dict[str, float]:
-        """Mean squared errors against the light, by what guessed it."""
+        """Mean squared errors of every guess against the light."""
 
 
 def source(recipe: Recipe, *, seed: int, **options: Any) -> TrainingSource:
@@ -197,7 +154,7 @@ def source(recipe: Recipe, *, seed: int, **options: Any) -> TrainingSource:
 
 
 def stepper(run: Run, streams: TrainingSource, passes: int) -> Callable[[], Tensor]:
-    """A function that takes one step and returns its loss, which a GPU need not have worked out yet."""
+    """A function that takes one step and returns its loss, which a GPU may still be computing."""
 
     def step() -> Tensor:
         run.optimiser.zero_grad(set_to_none=True)
@@ -218,7 +175,7 @@ class Validator:
         self._bank = Bank.drawn(seed, device, textures=32, units=16)
 
     def scores(self, network: nn.Module) -> dict[str, float]:
-        """PSNR against light 1.0 [dB] of the network and what it is compared with, each along whole streams."""
+        """PSNR against light 1.0 [dB] of the network and of simpler guesses, each along whole streams."""
         network.eval()
         streams = source(
             self._recipe,
@@ -235,10 +192,16 @@ class Validator:
 
 
 def started(recipe: Recipe, start: str, seed: int, patch: int = 64) -> nn.Module:
-    """The network of a file, or of the weights that ship under this name, ready to learn further.
+    """A trained network, ready to learn further.  Of a larger network a smaller one is made (`smaller`).
 
-    Of a larger network a smaller one is made (`smaller`), on streams of this seed and side [pixels].  Raises InputError
-    where the recipe is of another kind, or the larger one.
+    Args:
+        recipe: of the network to train.
+        start: a file of weights, or the name of weights that ship.
+        seed: of the streams from which the smaller network is made.
+        patch: their side [pixels].
+
+    Raises:
+        InputError: the weights are of another kind of network, or of a smaller one.
     """
     found, network, _ = load_weights(start)
     alike = replace(found, decoder=recipe.decoder, channels=recipe.channels, refine=recipe.refine) == recipe
@@ -256,7 +219,7 @@ def started(recipe: Recipe, start: str, seed: int, patch: int = 64) -> nn.Module
 
 
 def _teacher(recipe: Recipe, teacher: str) -> nn.Module:
-    """Raises InputError for a network of other windows."""
+    """InputError for a network of other windows."""
     found, network, _ = load_weights(teacher)
     if found.layout != recipe.layout:
         raise InputError(f"teacher is {teacher!r}, weights of another mode; give a file of this mode")
@@ -269,14 +232,3 @@ def _save(config: TrainConfig, recipe: Recipe, run: Run) -> Path:
     save_weights(weights, config.mode, recipe, run.network, record)
     save_progress(config.out, run)
     return weights
-
-
-def main() -> None:
-    """`python -m denoiser.train`: the options of TrainConfig."""
-    import tyro
-
-    print(train(tyro.cli(TrainConfig)))
-
-
-if __name__ == "__main__":
-    main()

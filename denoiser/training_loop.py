@@ -1,4 +1,4 @@
-"""The loop of every training here: steps at a rate of learning that warms up and falls, validations, and what is kept.
+"""The loop of every training here: steps at a rate of learning that warms up and falls, validations, and files.
 
 The rate warms up over WARM_UP_STEPS steps and falls as a cosine to nothing at the end.  A run that is limited by
 minutes ends where the clock says.
@@ -11,50 +11,22 @@ import math
 import time
 from collections.abc import Callable
 from pathlib import Path
-from typing import Protocol
 
 import torch
 from torch import Tensor
 from tqdm import tqdm
 
 from denoiser.run import Run
+from denoiser.training_options import TrainingOptions
 from spikecam_env.whole import whole_file, write_text_whole
 
 WARM_UP_STEPS = 100
 RUN_FILE = "last.pt"
-"""What a run resumes from, in its folder."""
-
-
-class Limits(Protocol):
-    """What the loop reads of a training's options."""
-
-    @property
-    def mode(self) -> str:
-        """Shown beside the progress bar."""
-
-    @property
-    def steps(self) -> int:
-        """Steps in all."""
-
-    @property
-    def minutes(self) -> float | None:
-        """Minutes in all; they count instead of the steps where they are given."""
-
-    @property
-    def lr(self) -> float:
-        """Highest rate of learning."""
-
-    @property
-    def validate_every(self) -> int:
-        """Steps."""
-
-    @property
-    def save_every_s(self) -> float:
-        """Seconds."""
+"""File in the folder of a run, from which it is resumed."""
 
 
 def learn(
-    limits: Limits,
+    limits: TrainingOptions,
     run: Run,
     step_of: Callable[[], Callable[[], Tensor]],
     validate: Callable[[], dict[str, float]],
@@ -65,9 +37,15 @@ def learn(
 ) -> Path:
     """Take steps to the end of the run; returns the path of the weights.
 
-    step_of: makes the step, a function that returns its loss; on a GPU a few steps are taken meanwhile (`captured`).
-    validate: scores by name, "network_db" among them.  save: writes all that is kept.  began: when this part of the
-    run did, by `time.monotonic`.
+    Args:
+        limits: options of the training.
+        run: to go on with.
+        step_of: makes the step, a function that returns its loss; on a GPU a few steps are taken meanwhile
+            (`captured`).
+        validate: scores by name, "network_db" among them.
+        save: writes all files.
+        began: begin of this part of the run, by `time.monotonic`.
+        progress: shows a bar.
     """
     before, saved = run.seconds, time.monotonic()
     bar = tqdm(total=limits.steps, initial=run.step, disable=not progress, mininterval=5.0, desc=limits.mode)
@@ -93,7 +71,7 @@ def learn(
     return save()
 
 
-def share_done(limits: Limits, run: Run) -> float:
+def share_done(limits: TrainingOptions, run: Run) -> float:
     """Share of the run that is over, by the clock where it is limited by minutes."""
     return run.step / limits.steps if limits.minutes is None else run.seconds / (60 * limits.minutes)
 
@@ -104,7 +82,7 @@ def rate_at(highest: float, step: int, done: float) -> float:
 
 
 def save_progress(folder: Path, run: Run) -> None:
-    """Write what the run resumes from, and its validations as numbers and as a picture; each file appears whole."""
+    """Write the file to resume from, and the validations as numbers and as a picture; each file appears whole."""
     run.save(folder / RUN_FILE)
     write_text_whole(folder / "curve.json", json.dumps(run.curve, indent=1))
     if run.curve:

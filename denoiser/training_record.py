@@ -1,4 +1,4 @@
-"""What a file of weights says of its training: the command, its options, how far it came."""
+"""The record of a training in its file of weights: the command, its options, how far it came."""
 
 from __future__ import annotations
 
@@ -6,12 +6,14 @@ from dataclasses import asdict, fields
 from importlib.metadata import PackageNotFoundError, version
 from typing import Any
 
+from denoiser.training_options import TrainingOptions
+
 NOT_RECORDED = ("out", "resume", "save_every_s")
 """Options that change nothing in the weights."""
 
 
-def training_record(config: Any, steps: int, seconds: float, resumed_at: list[int]) -> dict[str, Any]:
-    """Plain values, for a checkpoint.  config: `TrainConfig` or `ReconstructorConfig`."""
+def training_record(config: TrainingOptions, steps: int, seconds: float, resumed_at: list[int]) -> dict[str, Any]:
+    """Plain values, for a checkpoint."""
     try:
         package = version("spikecam-env")
     except PackageNotFoundError:
@@ -26,7 +28,7 @@ def training_record(config: Any, steps: int, seconds: float, resumed_at: list[in
     }
 
 
-def command(config: Any) -> str:
+def command(config: TrainingOptions) -> str:
     """The command line that trains so; OUT stands for the folder."""
     given = {f.name: getattr(config, f.name) for f in fields(config) if getattr(config, f.name) != f.default}
     options = (_option(name, value) for name, value in given.items() if name not in ("mode", *NOT_RECORDED))

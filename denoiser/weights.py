@@ -1,4 +1,4 @@
-"""Checkpoints: trained networks as small files that say what they are and how they were made.
+"""Checkpoints: trained networks as small files, with their recipe and the record of their training.
 
 A file is `torch.save` of plain values: format, mode, recipe, state_dict, training (command, seed, steps, minutes,
 package version) and sha256, the digest of recipe and weights.  A foreign file cannot run code (`denoiser.plain_torch`).
@@ -12,10 +12,10 @@ import io
 import json
 import os
 import warnings
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from importlib import resources
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any, Protocol, TypeVar
 
 import torch
 from torch import Tensor, nn
@@ -23,7 +23,7 @@ from torch import Tensor, nn
 from denoiser.plain_torch import read_plain, tensors_like
 from denoiser.recipe import RECIPES, Recipe
 from denoiser.threads import where_torch_can
-from spikecam_env.errors import InputError, unknown_name
+from spikecam_env.errors import InputError, shown, unknown_name
 from spikecam_env.whole import whole_file
 
 FORMAT = "spikecam-denoiser/1"
@@ -32,8 +32,14 @@ FORMAT = "spikecam-denoiser/1"
 class Described(Protocol):
     """A recipe of any kind of network."""
 
+    def network(self) -> nn.Module:
+        """The untrained network."""
+
     def to_dict(self) -> dict[str, Any]:
-        """Plain values that say what the network is."""
+        """The recipe as plain values."""
+
+
+R = TypeVar("R", bound=Described)
 
 
 def save_weights(
@@ -46,16 +52,23 @@ def save_weights(
 
 
 def load_weights(path: str | os.PathLike[str]) -> tuple[Recipe, nn.Module, dict[str, Any]]:
-    """Read a checkpoint, or the weights of a mode that ship: (recipe, network in evaluation mode, training record).
+    """Read a checkpoint, or the weights of a mode that ship.  Warns where it has no digest.
 
-    Warns where it has no digest.  Raises InputError for a missing or damaged file, a file of another kind, weights of
-    another network, and weights that are not finite or not those of the digest.
+    Args:
+        path: of the file, or the name of a mode.
+
+    Returns:
+        Recipe, network in evaluation mode, training record.
+
+    Raises:
+        InputError: a missing or damaged file, a file of another kind, weights of another network, and weights that are
+            not finite or not those of the digest.
     """
-    return where_torch_can(lambda: _load(weights_path(path)))
+    return where_torch_can(lambda: read_checkpoint(weights_path(path), FORMAT, Recipe.from_dict))
 
 
 def digest(recipe: Described, weights: Mapping[str, Tensor]) -> str:
-    """SHA-256 of what a network computes with: its recipe, and its weights by name."""
+    """SHA-256 of a recipe, and of weights by name."""
     found = hashlib.sha256(json.dumps(recipe.to_dict(), sort_keys=True).encode())
     for name in sorted(weights):
         tensor = weights[name].detach().cpu().contiguous()
@@ -72,11 +85,8 @@ def pretrained_path(mode: str) -> Path:
 
 
 def weights_path(weights: Any) -> Path:
-    """Where weights are that are given by path, or by the name of the mode that ships them.
-
-    Raises:
-        InputError: it is neither, a network for one.
-    """
+    """Path of weights that are given by path or by the name of a mode; InputError for another object, a network for
+    one."""
     if isinstance(weights, str) and weights in RECIPES:
         return pretrained_path(weights)
     if not isinstance(weights, str | os.PathLike):
@@ -95,7 +105,7 @@ def write_whole(path: str | os.PathLike[str], data: Any) -> None:
 
 
 def seal(path: str | os.PathLike[str]) -> None:
-    """Add the digest to a checkpoint without one; nothing else changes.  Raises InputError as `load_weights`."""
+    """Add the digest to a checkpoint without one; nothing else changes.  InputError as `load_weights`."""
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", UserWarning)
         recipe, _, _ = load_weights(path)
@@ -103,26 +113,35 @@ def seal(path: str | os.PathLike[str]) -> None:
     write_whole(path, data | {"sha256": digest(recipe, data["state_dict"])})
 
 
-def _load(path: str | os.PathLike[str]) -> tuple[Recipe, nn.Module, dict[str, Any]]:
+def read_checkpoint(
+    path: str | os.PathLike[str], form: str, recipe_of: Callable[[Any, str], R], number_type: torch.dtype | None = None
+) -> tuple[R, nn.Module, dict[str, Any]]:
+    """The parts of a checkpoint, as `load_weights` gives them.
+
+    Args:
+        path: of the file.
+        form: its format.
+        recipe_of: makes the recipe of plain values and the begin of an error's text.
+        number_type: of the weights in the file; None: that of the network.
+    """
     data = read_plain(path)
-    if not isinstance(data, dict) or data.get("format") != FORMAT:
+    if not isinstance(data, dict) or data.get("format") != form:
         found = data.get("format") if isinstance(data, dict) else type(data).__name__
-        raise InputError(
-            f"{path} is not a {FORMAT} checkpoint (found {str(found)[:60]!r}); give a file of `spikecam train`"
-        )
-    recipe = Recipe.from_dict(data.get("recipe"), f"{path}: recipe")
+        raise InputError(f"{path} is not a {form} checkpoint (found {shown(found)}); give a file of `spikecam train`")
+    recipe = recipe_of(data.get("recipe"), f"{path}: recipe")
     network, training = recipe.network(), data.get("training", {})
-    weights = tensors_like(network.state_dict(), data.get("state_dict"), str(path))
+    expected = {name: w if number_type is None else w.to(number_type) for name, w in network.state_dict().items()}
+    weights = tensors_like(expected, data.get("state_dict"), str(path))
     if not isinstance(training, dict):
         raise InputError(f"{path}: training is {type(training).__name__}; it must be a table; copy the file again")
-    if "sha256" not in data:
+    if "sha256" not in data and form == FORMAT:  # early files have none
         warnings.warn(
             f"{path} has no digest, so whether its weights are whole cannot be checked; "
             "if they are yours, add one with denoiser.weights.seal(path)",
             UserWarning,
             stacklevel=2,
         )
-    elif data["sha256"] != digest(recipe, weights):
+    elif data.get("sha256") != digest(recipe, weights):
         raise InputError(f"{path} is damaged: its weights are not those of its digest; copy it again or train anew")
     network.load_state_dict(weights)
     return recipe, network.eval(), dict(training)

@@ -1,19 +1,18 @@
-"""The rolling window: what a network sees of a stream, frame by frame, in training and online alike.
+"""The rolling window: the network's input from a stream, frame by frame, in training and online alike.
 
 A pass of the network covers `planes` frames b .. b + planes (b a multiple of `planes`) and sees
 
     spikes   frames b - past .. b + planes + future, (span, H, W) uint8
     planes   estimates of the rate per pixel [spikes/frame], (layers, H, W) float32, in this order:
-             1/ISI at each covered frame (`spikes/streams/isi.py`'s law, looking ahead to the window's end);
+             1/ISI at each covered frame (`spikecam_env.streams.isi_planes`, ahead to the window's end);
              interval rates n / (t_n - t_0) over whole intervals about the middle, one for each half-width (a count
              until the first spike has come);
-             running means e <- e + (s - e) / m over all frames up to the window's end, one for each memory m,
-             corrected for the short past at the start (divided by 1 - (1 - 1/m)^frames);
+             running means e <- e + (s - e) / m over all frames to the window's end, for each memory m;
              the pixel's gain, and whether it is known (where the layout asks for them), see below.
 
-A rate from n whole intervals errs by about 1/(t_n - t_0), a count by 1/window: for dim pixels that is less by the
-rate itself.  The running means carry what no window holds: pixels darker than one spike a window, and the
-fixed pattern under a moving scene.
+The means are divided by 1 - (1 - 1/m)^frames for the short past at the start.  A rate from n whole intervals errs by
+about 1/(t_n - t_0), a count by 1/window: for dim pixels that is less by the rate itself.  The running means know pixels
+darker than one spike a window, and the fixed pattern under a moving scene; no window does.
 
 Gain.  Where things move, the ratio of a pixel's spikes to its denoised rate, both summed over a long past,
 
@@ -43,19 +42,25 @@ from spikecam_env.compiled import njit
 from spikecam_env.errors import InputError
 
 WINDOW_PRIOR = 2.0
-"""Spikes that a pixel's gain of 1 weighs against what the sums say."""
+"""Weight of a gain of 1 against the sums [spikes]."""
 
 
 @dataclass(frozen=True)
 class WindowLayout:
-    """Frames a pass: `past` before, `planes` covered, `future` after; the extra planes (see above)."""
+    """Frames and extra planes of a pass (see above)."""
 
     past: int = 20
+    """Frames before the covered ones."""
     planes: int = 1
+    """Covered frames."""
     future: int = 20
+    """Frames after the covered ones."""
     half_widths: tuple[int, ...] = ()
+    """Of the interval rates [frames]."""
     memories: tuple[float, ...] = ()
-    gain_memory: float = 0.0  # frames; 0: no gain planes
+    """Of the running means [frames]."""
+    gain_memory: float = 0.0
+    """[frames]; 0: no gain planes."""
 
     @property
     def span(self) -> int:
@@ -69,7 +74,7 @@ class WindowLayout:
 
     @property
     def means(self) -> tuple[int, int]:
-        """Which of the layers are running means: the first, and the last + 1."""
+        """The layers that are running means: the first, and the last + 1."""
         first = self.planes + len(self.half_widths)
         return first, first + len(self.memories)
 
@@ -81,7 +86,7 @@ class WindowLayout:
 
 @dataclass(frozen=True)
 class PassWindow:
-    """One pass: the frames it covers are start .. start + count of the stream."""
+    """One pass: the frames that it covers are start .. start + count of the stream."""
 
     start: int
     count: int
@@ -129,7 +134,7 @@ class RollingWindow:
             self._sums[1] += rates.sum(axis=0)
 
     def state(self) -> dict[str, Any]:
-        """Everything that later passes depend on (copies)."""
+        """A copy of everything on which later passes depend."""
         return {
             "start": self.start,
             "seen": self.seen,
@@ -141,7 +146,7 @@ class RollingWindow:
         }
 
     def restore(self, state: dict[str, Any]) -> None:
-        """Continue from `state()`; raises InputError for arrays of another size or type."""
+        """Continue from `state()`; InputError for arrays of another size or type."""
         check_like(state["frames"], self._frames, "frames", lengths=False)
         for name, ours in (("last", self._last), ("means", self._means), ("sums", self._sums)):
             check_like(state[name], ours, name)
@@ -176,7 +181,7 @@ class RollingWindow:
         return PassWindow(self.start, min(layout.planes, self.seen - self.start), spikes, planes)
 
     def _calibrate(self, planes: NDArray[np.float32]) -> None:
-        """Take the pixel's gain out of the planes and say what it is; in place."""
+        """Take the pixel's gain out of the planes and add its planes; in place."""
         if self.unit is None:
             gain = np.clip((self._sums[0] + WINDOW_PRIOR) / (self._sums[1] + WINDOW_PRIOR), 0.5, 2.0)
         else:
@@ -207,8 +212,8 @@ class RollingWindow:
 
 
 def check_like(found: Any, ours: Any, name: str, *, lengths: bool = True) -> None:
-    """Raises InputError unless an entry of a state has this one's type and shape; without `lengths`, but for its first
-    axis."""
+    """InputError unless an entry of a state has this one's type and shape; without `lengths`, all axes but the first
+    count."""
     first = 0 if lengths else 1
     alike = type(found) is type(ours) and (
         not isinstance(ours, np.ndarray) or (found.dtype == ours.dtype and found.shape[first:] == ours.shape[first:])

@@ -19,23 +19,27 @@ from spikecam_env.errors import InputError
 
 @dataclass
 class StreamWindows:
-    """N streams mid-way; times are frames of the window, whose frame 0 is frame start - past of the stream.
-
-    frames: (N, span, H, W) uint8.  start: (N,) int64, the first covered frame.  last: (N, H, W) int32, time of the last
-    spike before the window; before the first spike that of frame -1 of the stream.  means: (N, memories, H, W).
-    averaged: (N,) frames in the means.  sums: (N, 2, H, W), of spikes and rates (`RollingWindow`).
-    gain, dark: (N, H, W), the calibration map [spikes/frame]; mapped: (N,) float, 1 where it is given, else 0.
-    """
+    """N streams mid-way; times are frames of the window, whose frame 0 is frame start - past of the stream."""
 
     frames: Tensor
+    """(N, span, H, W) uint8."""
     start: Tensor
+    """(N,) int64, the first covered frame."""
     last: Tensor
+    """(N, H, W) int32, time of the last spike before the window; before the first spike that of frame -1 of the stream.
+    """
     means: Tensor
+    """(N, memories, H, W)."""
     averaged: Tensor
+    """(N,) frames in the means."""
     sums: Tensor
+    """(N, 2, H, W), of spikes and rates (`RollingWindow`)."""
     gain: Tensor
+    """(N, H, W) of the calibration map."""
     dark: Tensor
+    """(N, H, W) of the calibration map [spikes/frame]."""
     mapped: Tensor
+    """(N,) float, 1 where a map is given, else 0."""
 
     @classmethod
     def begin(cls, layout: WindowLayout, streams: int, shape: tuple[int, int], device: torch.device) -> StreamWindows:
@@ -71,7 +75,8 @@ class StreamWindows:
 def pushed(layout: WindowLayout, w: StreamWindows, new: Tensor, begins: Tensor) -> tuple[StreamWindows, Tensor]:
     """The next pass: (N, planes, H, W) new frames -> windows and planes (N, layers, H, W) float32.
 
-    begins: (N,) bool; these streams begin with `new`, and their pass covers the frames before them.
+    Args:
+        begins: (N,) bool; these streams begin with `new`, and their pass covers the frames before them.
     """
     past, count = layout.past, layout.planes
     wide = begins[:, None, None]
@@ -115,7 +120,8 @@ def _planes(
 ) -> tuple[Tensor, Tensor]:
     """1/ISI, interval rates and means before any gain; and the last spike's time once `planes` frames have left.
 
-    none: (N, 1, 1) int32, the time that stands for no spike yet: one frame before the stream.
+    Args:
+        none: (N, 1, 1) int32, the time that stands for no spike yet: one frame before the stream.
     """
     past, count, span = layout.past, layout.planes, layout.span
     times = torch.arange(span, device=frames.device, dtype=torch.int32)[None, :, None, None]

@@ -22,20 +22,27 @@ WARM_UPS = ("black", "noisy")
 class DenoiseObservation(gymnasium.Wrapper, gymnasium.utils.RecordConstructorArgs):
     """Replaces each (K, H, W) block of spikes by the denoised block of the same length, `denoiser_latency` frames late.
 
-    mode: "best", "fast", "paper", the path of a checkpoint (.pt), or an `OnlineDnSS` of your own, of which the wrapper
-        takes another one: the same weights, stride and precision, a stream of its own.
-    output: "spikes" (same space) or "rate" (float32 in [0, 1]).
-    warm_up: what the first `denoiser_latency` frames of an episode show, which nothing was denoised for: "black", or
-        "noisy", the first block: its frames over again, or their mean rate.
-    Info: denoiser_latency, how late the block is; denoised_frames, how many of its frames, the last ones, are denoised.
-    Errors: InputError for packed or other observations, an unknown mode or output, and an unusable checkpoint;
-    NotReadyError for a step before the first reset or after `close`.
+    Info: denoiser_latency, by how many frames the block is late; denoised_frames, how many of its last frames are
+    denoised.
 
-    >>> from spikecam_env.envs.rotating_disk import RotatingDiskEnv
-    >>> env = DenoiseObservation(RotatingDiskEnv(shape=(16, 24)), output="rate")
-    >>> block, info = env.reset(seed=0)
-    >>> block.shape, info["denoiser_latency"]
-    ((40, 16, 24), 31)
+    Args:
+        env: its observations are blocks of spikes.
+        mode: "best", "fast", "paper", the path of a checkpoint (.pt), or an `OnlineDnSS` of your own.  The wrapper
+            takes another one like that: the same weights, stride and precision, a stream of its own.
+        output: "spikes" (same space) or "rate" (float32 in [0, 1]).
+        warm_up: the picture of the first `denoiser_latency` frames of an episode, for which nothing was denoised:
+            "black", or "noisy", the first block: its frames over again, or their mean rate.
+
+    Raises:
+        InputError: packed or other observations, an unknown mode or output, and an unusable checkpoint.
+        NotReadyError: a step before the first reset or after `close`.
+
+    Example:
+        >>> from spikecam_env.envs.rotating_disk import RotatingDiskEnv
+        >>> env = DenoiseObservation(RotatingDiskEnv(shape=(16, 24)), output="rate")
+        >>> block, info = env.reset(seed=0)
+        >>> block.shape, info["denoiser_latency"]
+        ((40, 16, 24), 31)
     """
 
     def __init__(
@@ -72,7 +79,7 @@ class DenoiseObservation(gymnasium.Wrapper, gymnasium.utils.RecordConstructorArg
         return self._late(observation), self._with_latency(info, len(observation))
 
     def step(self, action: Any) -> tuple[Any, Any, bool, bool, dict[str, Any]]:
-        """Step the environment and denoise what it saw."""
+        """Step the environment and denoise its observation."""
         self._open()
         observation, reward, terminated, truncated, info = self.env.step(action)
         late = self._late(observation)
@@ -93,7 +100,7 @@ class DenoiseObservation(gymnasium.Wrapper, gymnasium.utils.RecordConstructorArg
         return first
 
     def _first_frames(self, block: NDArray[Any], count: int) -> NDArray[Any]:
-        """(count, H, W) what is shown of frames before any is denoised."""
+        """(count, H, W) the frames that are shown before any is denoised."""
         if self._warm_up == "black":
             return np.zeros((count, *block.shape[1:]), self._type)
         if self._type == np.float32:

@@ -29,7 +29,7 @@ def test_a_program_imports(name: str) -> None:
     [
         ("spikecam_env.sensor", ("torch", "matplotlib", "scipy.stats", "scipy.interpolate", "cv2")),
         ("scenes", ("torch", "matplotlib", "scipy.stats", "trimesh", "OpenGL")),
-        ("denoiser", ("matplotlib", "scipy.stats", "trimesh", "OpenGL", "openvino")),
+        ("denoiser", ("matplotlib", "scipy.stats", "trimesh", "OpenGL")),
         ("spikecam_env.calibration", ("torch", "matplotlib", "scipy.stats")),
     ],
 )

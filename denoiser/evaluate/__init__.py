@@ -1,40 +1,13 @@
 """How good the denoiser is.
 
 quick.py        held-out scenes by simulation: `spikecam evaluate quick`
-tables.py       the paper's tables and scenes at rest: `spikecam evaluate table1 | table2 | table3 | table4 | still`
-measures.py     what the tables measure of rates against light, as pure functions
+tables.py       the paper's tables and scenes at rest: `spikecam evaluate table1`, `table2`, `table3`, `table4`,
+`still`
+measures.py     the tables' measures of rates against light, as pure functions
 spikezoo.py     clips in Spike-Zoo's layout, by its protocol: `spikecam evaluate spikezoo`
-truth.py        light that was seen: `spikecam evaluate truth`, of `halves.py`, `fixed_pattern.py` and `quick.py`
+truth.py        the truth tests: `spikecam evaluate truth`, of `halves.py`, `fixed_pattern.py` and `quick.py`
 """
 
-from denoiser.evaluate.quick import (
-    GROUPS,
-    HELD_OUT_KINDS,
-    LIGHTS,
-    PHOTOGRAPHS,
-    PICTURES,
-    SPEEDS,
-    HeldOut,
-    evaluate_quick,
-    held_out,
-    held_out_textures,
-    picture_of,
-    report,
-    summary,
-)
+from denoiser.evaluate.quick import HELD_OUT_KINDS, PICTURES, evaluate_quick, held_out_textures, report
 
-__all__ = [
-    "GROUPS",
-    "HELD_OUT_KINDS",
-    "LIGHTS",
-    "PHOTOGRAPHS",
-    "PICTURES",
-    "SPEEDS",
-    "HeldOut",
-    "evaluate_quick",
-    "held_out",
-    "held_out_textures",
-    "picture_of",
-    "report",
-    "summary",
-]
+__all__ = ["HELD_OUT_KINDS", "PICTURES", "evaluate_quick", "held_out_textures", "report"]

@@ -1,15 +1,14 @@
-"""What a case of the evaluation is, and what a camera has seen of it."""
+"""A case of the evaluation, and a camera's streams of it."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from spikecam_env.errors import InputError
+from denoiser.reconstruct import reconstruct, reconstruct_many
 from spikecam_env.streams import isi_plane, middleTFP
 from spikecam_env.types import Spikes
 
@@ -18,41 +17,41 @@ Planes = NDArray[np.float32]
 
 @dataclass(frozen=True)
 class StreamCase:
-    """One stream to judge: what it shows, and the settings that it follows from.
-
-    kind      "phm", a catalogue scene; "still", a collage that does not move; "real", a recording
-    scene     name in the catalogue, number of the collage with its light, or the recording's file
-    seed      of the camera: fixed pattern, starting phases, noise; of a recording, number of the instant
-    interval  mean frames between spikes over the picture; speed  [pixels/frame], 0: as the scene has it
-    shape     (rows, columns); frames  of the stream, whose middle frame is the picture; folder  of real recordings or
-              of a dataset, "" where the scene is simulated
-    """
+    """One stream to judge: its scene, and the settings from which it follows."""
 
     kind: str
+    """"phm", a catalogue scene; "still", a collage that does not move; "real", a recording."""
     scene: str
+    """Name in the catalogue, number of the collage with its light, or the recording's file."""
     seed: int
+    """Of the camera: fixed pattern, starting phases, noise; of a recording, number of the instant."""
     shape: tuple[int, int]
+    """(rows, columns)."""
     frames: int
+    """Of the stream, whose middle frame is the picture."""
     interval: float = 10.0
+    """Mean frames between spikes over the picture."""
     speed: float = 0.0
+    """[pixels/frame]; 0: as the scene has it."""
     folder: str = ""
+    """Of real recordings or of a dataset, "" where the scene is simulated."""
 
 
 @dataclass(frozen=True)
 class ExposedStreams:
-    """A case's streams, (T, H, W) from frame 0 on, and the frames first .. stop that are judged.
-
-    clean, light: of the noise-free twin, and true light (stop - first, H, W) in [0, 1] [spikes/frame]; None where they
-    are unknown.  middle: frame of the pictures.  white: light that is shown white, and from which PSNR counts.
-    """
+    """A case's streams, (T, H, W) from frame 0 on, and the frames first .. stop that are judged."""
 
     noisy: Spikes
     clean: Spikes | None
+    """Of the noise-free twin; None where it is unknown."""
     light: Planes | None
+    """True light (stop - first, H, W) in [0, 1] [spikes/frame]; None where it is unknown."""
     first: int
     stop: int
     middle: int
+    """Frame of the pictures."""
     white: float
+    """Light that is shown white, and from which PSNR counts."""
 
     def judged(self, stream: Spikes) -> Spikes:
         """The frames that are judged, of a stream from frame 0 on."""
@@ -64,27 +63,17 @@ CLASSICAL = {"tfp21": 21, "tfp41": 41, "tfi": 1}
 
 
 def picture(name: str, spikes: Spikes, t: int, weights: Path | None = None) -> Planes:
-    """(H, W) picture [spikes/frame] of the stream at frame t, by a name of `denoiser.reconstruct.RECONSTRUCTORS`.
-
-    weights: file of a learned one's, default the shipped ones.
-    """
+    """(H, W) picture [spikes/frame] at frame t, by a name of `denoiser.reconstruct.RECONSTRUCTORS`; by default with its
+    shipped weights."""
     if name == "tfi":
         return isi_plane(spikes, t, normalised=True)
     if name in CLASSICAL:
         return middleTFP(spikes, t, CLASSICAL[name])
-    return _reconstruction().reconstruct(name, spikes, t, weights=weights)  # type: ignore[no-any-return]
+    return reconstruct(name, spikes, t, weights=weights)
 
 
 def film(name: str, spikes: Spikes, frames: range, weights: Path | None = None) -> Planes:
     """(len(frames), H, W) pictures [spikes/frame] at many frames of the stream; weights as for `picture`."""
     if name in CLASSICAL:
         return np.stack([picture(name, spikes, t) for t in frames])
-    return np.asarray(_reconstruction().reconstruct_many(name, spikes, list(frames), weights=weights), np.float32)
-
-
-def _reconstruction() -> Any:
-    try:
-        import denoiser.reconstruct as reconstruction
-    except ImportError as error:
-        raise InputError("this package has no learned reconstruction (denoiser.reconstruct)") from error
-    return reconstruction
+    return reconstruct_many(name, spikes, frames, weights=weights)

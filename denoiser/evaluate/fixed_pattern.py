@@ -1,11 +1,12 @@
 """Fixed pattern that stays where the scene moves: how much of the camera's own grain is left in the denoised rate.
 
-A pixel that a scene passes sees many of its places; what it keeps differing from its neighbours by is its own.  The
-stretch is looked at twice, `grain.GAP` frames between; M is the mean of a look:
+A pixel that a scene passes sees many of its places; its lasting difference from its neighbours is its own.  There are
+two
+looks at the stretch, `grain.GAP` frames between; M is the mean of a look:
 
     pattern     size of the grain that the looks share, relative to the light (`grain.relative_grain`)
     kept        <grain of the denoised M of one look, grain of the noisy M of the other> by <that of the noisy both>:
-                what of the unit's pattern the denoiser lets through.  Noise is independent and drops out.
+                the share of the unit's pattern in the denoised rate.  Noise is independent and drops out.
     elsewhere   the noisy looks' shared grain 3 pixels away, by that of the same pixel: near 0 unless the scene moved
                 so little that both looks saw the same of it
 
@@ -48,10 +49,17 @@ Looks = tuple[Picture, Picture]
 
 
 def evaluate_pattern(spikes: NDArray[np.uint8], online: Mapping[str, OnlineDnSS]) -> dict[str, Any]:
-    """(T, H, W) spikes of a scene that moves everywhere.
+    """The pattern that is left of a scene that moves everywhere.
 
-    Returns "rows", of noisy and each mode: pattern, pattern_error, kept, kept_error; "elsewhere" and "frames".
-    Errors: InputError for looks of fewer than LEAST frames.
+    Args:
+        spikes: (T, H, W).
+        online: denoisers by mode.
+
+    Returns:
+        "rows", of noisy and each mode: pattern, pattern_error, kept, kept_error; "elsewhere" and "frames".
+
+    Raises:
+        InputError: the looks have fewer than LEAST frames.
     """
     noisy, denoised = _streams(spikes, online)
     return {"rows": _rows(noisy, denoised), "elsewhere": elsewhere(noisy), "frames": len(two_looks(spikes)[0])}
@@ -60,10 +68,17 @@ def evaluate_pattern(spikes: NDArray[np.uint8], online: Mapping[str, OnlineDnSS]
 def evaluate_simulated_pattern(
     online: Mapping[str, OnlineDnSS], *, scenes: int = 1, seed: int = 0, shape: tuple[int, int] = SHAPE
 ) -> dict[str, Any]:
-    """Held-out textures that slide past, before cameras of `MODELS`.
+    """The pattern that is left of held-out textures that slide past cameras of `MODELS`.
 
-    Returns, by model, what `evaluate_pattern` does, means over the scenes, each row with pattern_known and kept_known:
-    the same figures where the light is taken out.
+    Args:
+        online: denoisers by mode.
+        scenes: for each camera.
+        seed: of textures and cameras.
+        shape: (rows, columns).
+
+    Returns:
+        By model, the entries of `evaluate_pattern`, means over the scenes.  Each row has pattern_known and kept_known
+        too: the same figures where the light is taken out.
     """
     textures = held_out_textures(seed)
     results: dict[str, Any] = {}
@@ -132,7 +147,7 @@ def _less(looks: Looks, light: list[Any]) -> Looks:
 
 
 def _rows(noisy: Looks, denoised: Mapping[str, Looks], seen: Looks | None = None) -> list[dict[str, Any]]:
-    """seen: looks whose light the pattern is relative to, default the noisy ones."""
+    """The rows' figures; seen: looks whose light the pattern is relative to, default the noisy ones."""
     first, second = noisy if seen is None else seen
     light = scipy.ndimage.uniform_filter((first + second) / 2, SMOOTH)
     rows = []

@@ -1,8 +1,8 @@
 """Structure of the size of a pixel, and how much of it two independent looks share.
 
     residual    g = picture - mean of the 8 neighbours
-    shared      <g1 g2>: noise of the two looks is independent and drops out; what stays is fixed pattern, and texture
-                where the scene is the same in both.  GAP frames lie between the looks: where they touch, the part of
+    shared      <g1 g2>: noise of the two looks is independent and drops out; fixed pattern stays, and texture where the
+                scene is the same in both.  GAP frames lie between the looks: where they touch, the part of
                 an interval that one count misses the other has, and noise would be shared with the sign turned.
     of a pattern that is white from pixel to pixel, of relative size s:   <g1 g2> = (9/8) s^2 <light^2>
     kept        <d1 g2> / <g1 g2>, d of the denoised picture of the first look: 1 keeps all of it, 0 nothing
@@ -37,7 +37,7 @@ def two_looks(spikes: NDArray[np.uint8]) -> tuple[NDArray[np.uint8], NDArray[np.
 
 
 def residual(picture: Picture) -> NDArray[np.float64]:
-    """(H, W) -> (H, W) what a pixel differs from its 8 neighbours by; 0 at the border, where some are missing."""
+    """(H, W) -> (H, W) difference of a pixel from its 8 neighbours; 0 at the border, where some are missing."""
     wide = np.asarray(picture, np.float64)
     grain: NDArray[np.float64] = wide - scipy.ndimage.convolve(wide, _AROUND)
     grain[[0, -1], :] = grain[:, [0, -1]] = 0.0
@@ -49,25 +49,29 @@ def kept(
 ) -> tuple[float, float]:
     """Share of the noisy looks' grain that is left in denoised ones, and its standard error.
 
-    looks: (denoised, the noisy one it was made of, another noisy one).  where: (H, W) pixels that count.
+    Args:
+        looks: (denoised, the noisy one from which it was made, another noisy one).
+        where: (H, W) pixels that count; default all.
     """
     grains = [tuple(map(residual, look)) for look in looks]
     counts = np.ones(grains[0][0].shape, bool) if where is None else where
     left = counts * sum(d * other for d, _, other in grains)
-    there = counts * sum(own * other for _, own, other in grains)
-    return _with_error(lambda use: float(left[use].sum() / there[use].sum()), counts.shape)
+    whole = counts * sum(own * other for _, own, other in grains)
+    return _with_error(lambda use: float(left[use].sum() / whole[use].sum()), counts.shape)
 
 
 def relative_grain(looks: tuple[Picture, Picture], light: Picture) -> tuple[float, float]:
-    """Size s of the grain that two looks share, by the light they see, and its standard error; < 0: they share none.
+    """Size s of the grain that two looks share, relative to their light, and its standard error; < 0: they share none.
 
-    light: (H, W), smooth enough to weigh with.
+    Args:
+        looks: (H, W) twice.
+        light: (H, W), smooth enough to weigh with.
     """
     g1, g2 = map(residual, looks)
-    there, square = g1 * g2, WHITE * np.square(np.asarray(light, np.float64))
+    product, square = g1 * g2, WHITE * np.square(np.asarray(light, np.float64))
 
     def size(use: NDArray[np.bool_]) -> float:
-        shared = float(there[use].sum() / square[use].sum())
+        shared = float(product[use].sum() / square[use].sum())
         return float(np.sign(shared) * np.sqrt(abs(shared)))
 
     return _with_error(size, g1.shape)

@@ -8,16 +8,16 @@ reference   mean of the other half: N frames, n spikes a pixel
 noise^2     var(n) / N^2, the reference's own.  var(n) is half the mean square difference of the counts of its first and
             last two fifths, which do not touch.  Charge passes on from spike to spike, so the variance of a count does
             not grow with its window: 1/6 for a camera without noise.
-static      E <= m + 4 sd, E the mean square difference of the two halves' counts over 5 x 5 pixels, m its median over
-            the picture and sd 1.48 x its median distance from m, which few moving pixels do not change.  By chance
+static      E <= m + 4 sd, E the mean square difference of the two halves' counts over 5 x 5 pixels.  m is its median
+            over the picture, sd 1.48 x its median distance from m; few moving pixels do not change them.  By chance
             1 in 30 000 is beyond.  Squares, since a fine texture that moved is brighter here and darker there.
-brightest   what 1 in 1000 of the static pixels of the reference exceeds
+brightest   a level that 1 in 1000 of the static pixels of the reference exceeds
 
 Each half is denoised in its turn; figures are means over both, +- half their difference.
 
-What this truth contains: the pixel's own fixed pattern.  A denoiser that removes it is right and is marked down here.
-`kept` says how much of what a pixel differs from its neighbours by is left, pattern and finest texture together
-(`evaluate.grain`); `pattern_db` is what a picture without error but for a pattern of 2.8 % removed would be given.
+This truth contains the pixel's own fixed pattern.  A denoiser that removes it is right and is marked down here.  `kept`
+is the share of a pixel's difference from its neighbours that is left, pattern and finest texture together
+(`evaluate.grain`).  `pattern_db` is the mark of a picture without error but for a pattern of 2.8 % removed.
 """
 
 from __future__ import annotations
@@ -52,21 +52,32 @@ WINDOWS = (21, 41)
 
 @dataclass(frozen=True)
 class Reference:
-    """rate: (H, W) mean of a half [spikes/frame].  noise: its variance.  static: (H, W).  brightest [spikes/frame]."""
+    """The truth of a half."""
 
     rate: NDArray[np.float64]
+    """(H, W) mean of the half [spikes/frame]."""
     noise: float
+    """Variance of the rate."""
     static: NDArray[np.bool_]
+    """(H, W)."""
     brightest: float
+    """[spikes/frame]."""
 
 
 def evaluate_halves(spikes: NDArray[np.uint8], online: Mapping[str, OnlineDnSS]) -> dict[str, Any]:
-    """(T, H, W) spikes of a scene that is static in most places.
+    """Judge denoisers on a recording of a scene that is static in most places.
 
-    Returns "rows": for noisy TFP 21, 41 and the whole half, and of each mode the last rate plane that saw its whole
-    window and the mean over the half: error_db, spread_db, bias (relative), kept, kept_error; and what the test found:
-    static (share of pixels), count_variance, reference_db (of the reference's noise), pattern_db, brightest, frames.
-    Errors: InputError for halves of fewer than LEAST frames, and where nothing is static or lit.
+    Args:
+        spikes: (T, H, W).
+        online: denoisers by mode.
+
+    Returns:
+        "rows": for noisy TFP 21, 41 and the whole half, and of each mode the last rate plane that saw its whole window
+        and the mean over the half: error_db, spread_db, bias (relative), kept, kept_error.  And of the test: static
+        (share of pixels), count_variance, reference_db (of the reference's noise), pattern_db, brightest, frames.
+
+    Raises:
+        InputError: the halves have fewer than LEAST frames, or nothing is static or lit.
     """
     both = two_looks(spikes)
     half = len(both[0])
@@ -102,7 +113,7 @@ def static_pixels(first: NDArray[np.uint8], second: NDArray[np.uint8]) -> NDArra
 
 
 def reference(spikes: NDArray[np.uint8], static: NDArray[np.bool_]) -> Reference:
-    """The mean of a half, and how well it is known.  Raises InputError where nothing is static, or it is dark."""
+    """The mean of a half, and its noise; InputError where nothing is static, or it is dark."""
     part = len(spikes) * 2 // 5
     apart = spikes[:part].sum(axis=0, dtype=np.int64) - spikes[-part:].sum(axis=0, dtype=np.int64)
     rate = spikes.mean(axis=0, dtype=np.float64)

@@ -1,4 +1,4 @@
-"""Intervals to spikes without an update: what the paper's ablation has in place of its multi-stage update (MUS).
+"""Intervals to spikes without an update, which the paper's ablation has in place of its multi-stage update (MUS).
 
 At a spike the pixel takes the interval predicted for that instant, and keeps it to its end,
 

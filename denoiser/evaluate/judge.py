@@ -41,14 +41,7 @@ class PictureScore(Declared):
 
 
 class RowResult(Declared):
-    """What was found for one row of one case; None where a measure has no value.
-
-    weights: SHA-256 of what it was made with, by name of the row's source and of the columns.
-    pictures: by column, at the middle frame; `plane` is the rate plane.
-    mean_plane: the mean score of all judged rate planes.  bias, lag [frames]: of the row's rates, or of its spikes.
-    db_by_place [dB], flicker, texture: of its rate planes, see `measures`.
-    mean_db, last_db [dB]: where nothing moves, of the mean over all frames, and of the last picture.
-    """
+    """The measures of one row of one case; None where a measure has no value."""
 
     scene: Name
     seed: Seed
@@ -56,19 +49,29 @@ class RowResult(Declared):
     speed: float
     row: Name
     weights: dict[str, str | None]
+    """SHA-256 of the weights behind it, by name of the row's source and of the columns."""
     pictures: dict[str, PictureScore]
+    """By column, at the middle frame; `plane` is the rate plane."""
     mean_plane: PictureScore | None = None
+    """The mean score of all judged rate planes."""
     bias: float | None = None
+    """Of the row's rates, or of its spikes (`measures`)."""
     lag: float | None = None
+    """As `bias` [frames]."""
     db_by_place: list[float | None] = Field(default_factory=list)
+    """Of its rate planes (`measures`) [dB]."""
     flicker: float | None = None
+    """Of its rate planes (`measures`)."""
     texture: float | None = None
+    """Of its rate planes (`measures`)."""
     mean_db: float | None = None
+    """Where nothing moves, of the mean over all frames [dB]."""
     last_db: float | None = None
+    """Where nothing moves, of the last picture [dB]."""
 
     @property
     def key(self) -> tuple[str, int, float, float, str]:
-        """Which row of which case."""
+        """The case and the row."""
         return self.scene, self.seed, self.interval, self.speed, self.row
 
 
@@ -80,8 +83,7 @@ def display(radiance: Planes, white: float) -> np.ndarray:
 def pictures_of(
     spikes: Spikes, planes: Planes | None, exposed: ExposedStreams, columns: Mapping[str, Path]
 ) -> dict[str, Planes]:
-    """By column: the row's pictures at the middle frame, and its rate plane there.  columns: file of weights of each,
-    which those that need none ignore."""
+    """The row's pictures at the middle frame, and its rate plane there, by column.  `columns`: weights of each."""
     middle = exposed.middle - exposed.first
     shown = {column: picture(column, spikes, middle, weights) for column, weights in columns.items()}
     return shown if planes is None else shown | {PLANE: planes[middle]}

@@ -1,4 +1,4 @@
-"""What is measured of rates against the light: time lag, bias, flicker, texture.
+"""Measures of rates against the light: time lag, bias, flicker, texture.
 
 All take (T, H, W) arrays in spikes/frame that cover the same frames: the light, and either rate planes or spikes, whose
 quantisation averages out over pixels.  NaN stands for a measure that has no value, e.g. the lag where nothing moves.
@@ -17,8 +17,8 @@ Frames = NDArray[np.floating] | NDArray[np.uint8]
 MOST_LAG = 12
 """Longest lag that is looked for, either way [frames]; the window of `paper` reaches 20, the rate it finds far less."""
 PASSING = 12
-"""The light's variation is its deviation from the mean of the frames so far before and after [frames]: what changes
-within an interval of a well lit pixel counts, slow drifts do not."""
+"""The light's variation is its deviation from the mean of the frames so far before and after [frames]: changes within
+an interval of a well lit pixel count, slow drifts do not."""
 MOVES = 1e-4
 """Least rms variation of the light over its mean for a lag to be defined: float32 sums of still light vary by 1e-7."""
 WELL_LIT = 0.5
@@ -36,8 +36,10 @@ def lag_frames(rate: Frames, light: Frames) -> float:
 
         C(k) = sum over pixels and frames t of rate(t + k) v(t),      v = light - (light(t - w) + light(t + w)) / 2
 
-    v is symmetric in time, so that trends do not move the peak.  NaN for light that does not vary, and for fewer than
-    2 (MOST_LAG + PASSING) + 1 frames.
+    v is symmetric in time, so that trends do not move the peak.
+
+    Returns:
+        The lag; NaN for light that does not vary, and for fewer than 2 (MOST_LAG + PASSING) + 1 frames.
     """
     margin = MOST_LAG + PASSING
     count = len(light) - 2 * margin
@@ -72,7 +74,8 @@ def db_by_place(rates: Frames, light: Frames, planes: int, first: int, peak: flo
 def across_over_within(rates: Frames, light: Frames, planes: int, first: int) -> float:
     """Flicker: rms error of the change from frame to frame where a new pass begins, over that within a pass.
 
-    1: passes cannot be seen.  NaN for passes of one plane.
+    Returns:
+        1: passes cannot be seen.  NaN for passes of one plane.
     """
     error = np.diff(np.asarray(rates, np.float32) - light, axis=0)
     begins = (first + 1 + np.arange(len(error))) % planes == 0
@@ -83,10 +86,12 @@ def across_over_within(rates: Frames, light: Frames, planes: int, first: int) ->
 
 
 def texture_slope(picture: NDArray[np.floating], light: NDArray[np.floating]) -> float:
-    """How much of fine, low-contrast texture is left: 1 all, 0 none.
+    """The slope of the picture's texture on the light's, least squares, where contrast is below LOW_CONTRAST.
 
-    The slope of the picture's texture on the light's, least squares, where contrast is below LOW_CONTRAST.  Noise of
-    the picture does not bias it, for the light has none.  NaN where there is no such texture.
+    Noise of the picture does not bias it, for the light has none.
+
+    Returns:
+        How much of fine, low-contrast texture is left: 1 all, 0 none; NaN where there is no such texture.
     """
     truth, found = (np.asarray(p, np.float64) for p in (light, picture))
     level = scipy.ndimage.gaussian_filter(truth, FINE)

@@ -1,4 +1,4 @@
-"""The picture page of a table: one strip a scene, from what the rows show, noisy to light."""
+"""The picture page of a table: one strip a scene, of the rows' pictures, noisy to light."""
 
 from __future__ import annotations
 

@@ -1,7 +1,7 @@
 """PHM_N: the ten scenes of `spikecam dataset phm-n`, at true speed or another, simulated or from a dataset.
 
-The picture is of the middle frame.  What is judged are the frames about it: as many as its pictures look at, and three
-mean intervals on either side, so that TFI finds whole intervals in most pixels.  At least WARM_UP frames come before
+The picture is of the middle frame.  The frames about it are judged: as many as its pictures look at, and three mean
+intervals on either side, so that TFI finds whole intervals in most pixels.  At least WARM_UP frames come before
 the picture, by default before all that is judged.
 Seed 0 is the camera of the dataset with seed 0; other seeds are other cameras before the same scene.
 """
@@ -46,15 +46,13 @@ def reach(interval: float) -> int:
 
 
 def default_frames(interval: float) -> int:
-    """Length of a stream whose middle has what it needs before it."""
+    """Length of a stream whose middle has enough frames before it."""
     return 2 * (WARM_UP + reach(interval))
 
 
 def dataset_cases(folder: str | Path) -> list[StreamCase]:
-    """The scenes of a dataset that `spikecam dataset phm-n` made.
-
-    Raises InputError for a folder that holds none, and for one whose files are not done.
-    """
+    """The scenes of a dataset that `spikecam dataset phm-n` made; InputError for a folder that holds none, or
+    unfinished files."""
     manifest = Manifest.read(Path(folder)).without_lost(Path(folder))
     settings = manifest.settings
     rows, columns = settings["shape"]

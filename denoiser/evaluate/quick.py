@@ -2,23 +2,22 @@
 
 Held out: photographs (scikit-image's) and the texture kinds that training never sees, other seeds, SCSim's preset,
 speeds and light levels in a grid.  Pictures (TFP 21, TFP 41, TFI) are taken at least 100 frames after the start, where
-noisy and clean twins have long forgotten their common phase.  Two truths are asked: the light at the middle frame, and
+noisy and clean twins have long forgotten their common phase.  There are two truths: the light at the middle frame, and
 the clean twin's picture.  PSNR and SSIM count from the scene's brightest light.
 
-"well lit, moving" is what the method is for (the paper's sets are high-speed scenes in good light); still and dim
-scenes are listed apart.  In a still scene fixed pattern and texture look alike: only knowledge of pictures helps.
+The method is for "well lit, moving" (the paper's sets are high-speed scenes in good light); still and dim scenes are
+listed apart.  In a still scene fixed pattern and texture look alike: only knowledge of pictures helps.
 
 Rows: noisy; two for each mode, its spikes and its rate planes; clean (the noise-free twin); oracle (the true light
-through `denoiser.accumulate`).
-The oracle is what a perfect network would score: against the light it is the clean stream's equal; against the clean
-twin's picture it is a bound on any stream of spikes, for two streams of one light differ by their quantisation
-(`metrics.count_variance`); rates are not quantised and may come half that (3 dB) nearer.
+through `denoiser.accumulate`).  The oracle has the score of a perfect network: against the light it is the clean
+stream's equal.  Against the clean twin's picture it bounds any stream of spikes, for two streams of one light differ by
+their quantisation (`metrics.count_variance`).  Rates are not quantised and may come half that (3 dB) nearer.
 """
 
 from __future__ import annotations
 
 import os
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -29,9 +28,9 @@ from numpy.typing import NDArray
 from tqdm import tqdm
 
 from denoiser import accumulate
-from denoiser.evaluate.writing import write_result
+from denoiser.evaluate.restored import Weights, denoisers, restored
+from denoiser.evaluate.writing import number, write_result
 from denoiser.metrics import gap_closed, psnr_db, ssim
-from denoiser.online import OnlineDnSS
 from denoiser.pairs import light_in_frame
 from scenes.collage import Collage
 from scenes.textures import Texture, random_texture
@@ -66,7 +65,7 @@ class HeldOut:
 def evaluate_quick(
     modes: Sequence[str] = ("paper", "best"),
     *,
-    weights: Mapping[str, str | os.PathLike[str]] | None = None,
+    weights: Weights | None = None,
     scenes_a_class: int = 2,
     shape: tuple[int, int] = (96, 96),
     frames: int = 280,
@@ -76,20 +75,29 @@ def evaluate_quick(
 ) -> dict[str, Any]:
     """Evaluate on the held-out grid: static, slow, fast x bright, middle, dim.
 
-    weights: checkpoint by mode, instead of the shipped ones.  model: of the cameras, default the preset `scsim`.
-    out: a folder for `evaluate.json` and `evaluate.txt`.
-    Returns group (`GROUPS`) -> row -> picture -> {light_db, light_ssim, clean_db, clean_ssim, gap_closed}, and
-    "settings" (with the mean interval [frames] of each light level).
+    Args:
+        modes: denoisers to judge.
+        weights: checkpoint by mode, instead of the shipped ones.
+        scenes_a_class: of each speed and light.
+        shape: (rows, columns).
+        frames: of each stream.
+        seed: of scenes and cameras.
+        model: of the cameras, default the preset `scsim`.
+        out: a folder for `evaluate.json` and `evaluate.txt`.
+
+    Returns:
+        Group (`GROUPS`) -> row -> picture -> {light_db, light_ssim, clean_db, clean_ssim, gap_closed}, and "settings"
+        (with the mean interval [frames] of each light level).
     """
-    denoisers = {m: _denoiser(m, (weights or {}).get(m)) for m in modes}
+    online = denoisers(modes, weights)
     scores: list[dict[str, Any]] = []
     scenes = held_out(scenes_a_class, shape, frames, seed, model)
     total = scenes_a_class * len(SPEEDS) * len(LIGHTS)
     for scene in tqdm(scenes, desc="held-out scenes", unit="scene", total=total, leave=False):
         noisy, clean, oracle = (scene.streams[row] for row in ("noisy", "clean", "oracle"))
         denoised: dict[str, Stream] = {}
-        for mode, online in denoisers.items():
-            denoised[mode], denoised[f"{mode} rate"] = _whole(online, noisy)
+        for mode, denoiser in online.items():
+            denoised[mode], denoised[f"{mode} rate"], _ = restored(denoiser, noisy, mode)
         scores += _score(scene, {"noisy": noisy, **denoised, "clean": clean, "oracle": oracle})
     result: dict[str, Any] = {
         group: summary([s for s in scores if s["speed"] in speeds and s["light"] in lights])
@@ -110,10 +118,7 @@ def evaluate_quick(
 def held_out(
     scenes_a_class: int, shape: tuple[int, int], frames: int, seed: int, model: SensorModel | None = None
 ) -> Iterator[HeldOut]:
-    """The held-out scenes, exposed; textures, motions, camera units and noise follow from the seed.
-
-    model: of the cameras, default the preset `scsim`.
-    """
+    """The held-out scenes, exposed; textures, motions, camera units and noise follow from the seed."""
     camera = SensorModel.preset("scsim") if model is None else model
     textures = held_out_textures(seed)
     for i, (speed, light) in enumerate((s, b) for s in SPEEDS for b in LIGHTS):
@@ -177,18 +182,6 @@ def picture_of(stream: Stream, kind: str, t: int) -> NDArray[np.float32]:
         mean: NDArray[np.float32] = stream[t - window // 2 : t + window // 2 + 1].mean(axis=0)
         return mean
     return middleTFI(stream, t) if kind == "TFI" else middleTFP(stream, t, window)
-
-
-def _denoiser(mode: str, path: str | os.PathLike[str] | None) -> OnlineDnSS:
-    if path is None:
-        return OnlineDnSS.pretrained(mode, output="both")
-    return OnlineDnSS.from_file(path, output="both")
-
-
-def _whole(online: OnlineDnSS, spikes: Stream) -> tuple[Stream, Stream]:
-    online.reset()
-    (first, first_rates), (rest, rest_rates) = online.push(spikes), online.flush()
-    return np.concatenate([first, rest]), np.concatenate([first_rates, rest_rates])
 
 
 def _expose(scene: Collage, speed: str, light: str, frames: int, seed: int, model: SensorModel) -> HeldOut:
@@ -255,14 +248,5 @@ def _table(title: str, table: Summary) -> str:
 
 def _cell(s: dict[str, float | None]) -> str:
     gap = None if s["gap_closed"] is None else 100 * s["gap_closed"]
-    light = f"| {_shown(s['light_db'], 7, 2)} {_shown(s['light_ssim'], 6, 3)} {_shown(gap, 5, 0)} % "
-    return light + f"| {_shown(s['clean_db'], 9, 2)} {_shown(s['clean_ssim'], 8, 3)}  "
-
-
-def _shown(value: float | None, width: int, digits: int) -> str:
-    return f"{'-':>{width}}" if value is None else f"{value:{width}.{digits}f}"
-
-
-def main() -> None:
-    """`python -m denoiser.evaluate`: the quick evaluation, printed."""
-    print(report(evaluate_quick()))
+    light = f"| {number(s['light_db'], 7, 2)} {number(s['light_ssim'], 6, 3)} {number(gap, 5, 0)} % "
+    return light + f"| {number(s['clean_db'], 9, 2)} {number(s['clean_ssim'], 8, 3)}  "

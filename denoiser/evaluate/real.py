@@ -23,7 +23,7 @@ WHITE = 99.5
 
 
 def real_cases(path: Path) -> list[StreamCase]:
-    """A recording as cases, one an instant, whose number is the seed.  Raises InputError where it cannot be read."""
+    """A recording as cases, one an instant, whose number is the seed; InputError where it cannot be read."""
     spikes = _spikes(path)
     interval = round(1 / max(float(spikes.mean()), 1e-6), 1)
     shape = (spikes.shape[1], spikes.shape[2])
@@ -33,7 +33,7 @@ def real_cases(path: Path) -> list[StreamCase]:
 
 
 def expose(case: StreamCase) -> ExposedStreams:
-    """The recording; what is judged are the frames about one of its instants, as far as it goes."""
+    """The recording; frames about one of its instants are judged, as far as it goes."""
     noisy = _spikes(Path(case.folder) / case.scene)
     middle = (case.seed + 1) * case.frames // (INSTANTS + 1)
     around = min(reach(case.interval), middle, len(noisy) - 1 - middle)

@@ -19,18 +19,18 @@ Weights = Mapping[str, str | os.PathLike[str]]
 
 
 class Restored(NamedTuple):
-    """Denoised (T, H, W) spikes uint8 and rates float32 [spikes/frame].
-
-    whole: frames, from the first, that came out before the stream's end was known.
-    """
+    """A denoised stream."""
 
     spikes: NDArray[np.uint8]
+    """(T, H, W)."""
     rates: NDArray[np.float32]
+    """(T, H, W) [spikes/frame]."""
     whole: int
+    """Frames, from the first, that came out before the stream's end was known."""
 
 
 def denoisers(modes: Sequence[str], weights: Weights | None = None) -> dict[str, OnlineDnSS]:
-    """A denoiser of each mode, which gives both spikes and rates; raises InputError as `OnlineDnSS` does."""
+    """A denoiser of each mode, which gives both spikes and rates; InputError as `OnlineDnSS`."""
     given = weights or {}
     return {
         mode: OnlineDnSS.from_file(given[mode], output="both")
@@ -40,12 +40,12 @@ def denoisers(modes: Sequence[str], weights: Weights | None = None) -> dict[str,
     }
 
 
-def restored(online: OnlineDnSS, spikes: NDArray[np.uint8], what: str = "denoise") -> Restored:
-    """(T, H, W) spikes through a denoiser from its first frame.  what: for the progress bar."""
+def restored(online: OnlineDnSS, spikes: NDArray[np.uint8], title: str = "denoise") -> Restored:
+    """(T, H, W) spikes through a denoiser from its first frame, with a bar of progress."""
     stream = online.another("both")
     fired, rates, whole = np.empty_like(spikes), np.empty(spikes.shape, np.float32), 0
     ready = 0
-    with tqdm(total=len(spikes), desc=what, unit="frame", leave=False) as bar:
+    with tqdm(total=len(spikes), desc=title, unit="frame", leave=False) as bar:
         for start in range(0, len(spikes) + CHUNK, CHUNK):
             over = start >= len(spikes)
             whole = ready if over else whole

@@ -1,4 +1,4 @@
-"""The rows of the tables: what each makes of a noisy stream.
+"""The rows of the tables: rates and spikes from a noisy stream.
 
 A source gives rates or spikes of the judged frames; a decoder makes spikes of rates.  Rows of one source are made in
 one go, so that a network runs once for MUS and accumulation.
@@ -7,7 +7,7 @@ one go, so that a network runs once for MUS and accumulation.
     TFP, SSML, ...     the paper's pipelines: every frame reconstructed, then spikes by the noise-free camera, which is
                        `denoiser.accumulate`
     paper, best, ...   rate planes of an `OnlineDnSS`, from the stream's first frame on
-    light              the true light through a decoder: what a perfect network would score
+    light              the true light through a decoder: the score of a perfect network
 """
 
 from __future__ import annotations
@@ -27,6 +27,7 @@ from denoiser.evaluate import held, still
 from denoiser.evaluate.exposed import CLASSICAL, ExposedStreams, Planes, StreamCase, film
 from denoiser.online import OnlineDnSS
 from denoiser.plain_torch import read_plain
+from denoiser.weights import load_weights
 from spikecam_env.errors import InputError
 from spikecam_env.types import Spikes
 from spikecam_env.untrusted import existing_file
@@ -34,19 +35,19 @@ from spikecam_env.untrusted import existing_file
 DECODERS: dict[str, Any] = {"held": held, "mus": mus, "accumulate": accumulate}
 CHUNK = 32
 """Frames pushed at a time."""
-BEFORE = "before"
-"""Weights to compare with: none are shipped under this name."""
 
 
 @dataclass(frozen=True)
 class Row:
-    """title  in the table.  decoder  of the source's rates, "" where it gives spikes.  shows_planes: its rate planes
-    are judged too."""
+    """A row of a table."""
 
     title: str
+    """In the table."""
     source: str
     decoder: str = ""
+    """Of the source's rates, "" where it gives spikes."""
     shows_planes: bool = False
+    """Its rate planes are judged too."""
 
 
 ROWS: dict[str, Row] = {
@@ -64,7 +65,6 @@ ROWS: dict[str, Row] = {
     "best": Row("best", "best", "accumulate", True),
     "fast": Row("fast", "fast", "accumulate", True),
     "best-overlap": Row("best, passes overlapped", "best-overlap", "accumulate", True),
-    "before": Row("best, earlier weights", "before", "accumulate", True),
     "best-map": Row("best with calibration", "best-map", "accumulate", True),
     "clean": Row("clean twin", "clean"),
     "light-held": Row("true light, intervals kept", "light", "held"),
@@ -78,7 +78,6 @@ NETWORKS = {
     "fast": "fast",
     "best-overlap": "best",
     "best-map": "best",
-    "before": BEFORE,
 }
 """Weights of the sources that are denoisers."""
 PIPELINES = ("tfp41", "ssml", "spk2img-clean", "spk2img-noisy")
@@ -94,16 +93,16 @@ class Weights:
 
     @classmethod
     def found(cls, folder: Path | None, files: Mapping[str, Path]) -> Weights:
-        """The files, and of names that have none NAME.pt in a folder, where it is there."""
-        there = {} if folder is None else {n: folder / f"{n}.pt" for n in NAMES if (folder / f"{n}.pt").is_file()}
-        return cls(there | dict(files))
+        """The files, and of names that have none NAME.pt in a folder, where it exists."""
+        here = {} if folder is None else {n: folder / f"{n}.pt" for n in NAMES if (folder / f"{n}.pt").is_file()}
+        return cls(here | dict(files))
 
     def path(self, name: str) -> Path:
         """Where weights of a name are, or would be."""
         return self.files.get(name) or Path(str(resources.files("denoiser") / "weights" / f"{name}.pt"))
 
     def check(self) -> None:
-        """Raises InputError for a file that was asked for and is not there."""
+        """InputError for a given file that does not exist."""
         for path in self.files.values():
             existing_file(path)
 
@@ -130,7 +129,7 @@ def weights_of(source: str) -> str | None:
 
 
 def why_not(source: str, weights: Weights) -> str:
-    """Why a source cannot be had, or "".  Raises InputError for a file that was asked for and cannot be read."""
+    """Why a source cannot be had, or ""; InputError for a given file that cannot be read."""
     name = weights_of(source)
     if name is not None and (why := weights.missing(name)):
         return why
@@ -147,7 +146,7 @@ def why_not(source: str, weights: Weights) -> str:
 def streams(
     source: str, rows: list[str], case: StreamCase, exposed: ExposedStreams, weights: Weights
 ) -> dict[str, tuple[Spikes, Planes | None]]:
-    """By row of the source: (judged frames, H, W) spikes, and the planes they were made of where there are any."""
+    """By row of the source: (judged frames, H, W) spikes, and the planes behind them where there are any."""
     if source in ("noisy", "clean"):
         whole = exposed.noisy if source == "noisy" else exposed.clean
         assert whole is not None
@@ -184,8 +183,6 @@ def planes_a_pass(source: str, weights: Weights) -> int:
 
 @lru_cache(maxsize=8)
 def _passes(path: Path) -> int:
-    from denoiser.weights import load_weights
-
     return load_weights(path)[0].layout.planes
 
 

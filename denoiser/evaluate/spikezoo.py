@@ -1,7 +1,5 @@
 """Pictures against the truth by the protocol of others: Spike-Zoo's, on clips in its layout (`datasets.spikezoo`).
 
-What it compares, and how:
-
     picture     rate [spikes/frame] / 0.6, cut to [0, 1], at frame T // 2
     TFP         mean of the 41 frames about it
     TFI         1 / (next spike - last spike), the last among 20 frames to T // 2, the next among the 20 after it;
@@ -9,9 +7,9 @@ What it compares, and how:
     PSNR        both pictures moved to [-1, 1], peak 2: that of [0, 1] and peak 1
     SSIM        the same pictures in [-1, 1], windows of 7 x 7, data range 2
 
-SSIM in [-1, 1] is another number than in [0, 1], which the last column has: the term of the local means a and b,
-(2 a b + C) / (a^2 + b^2 + C), punishes differences about mid-grey, where a and b pass through 0, and forgives them in
-the dark.  In one thing we differ: Spike-Zoo leaves PSNR's peak to scikit-image, which takes 1 in place of 2, 6 dB
+SSIM in [-1, 1] is another number than in [0, 1], which the last column has.  Its term of the local means a and b is
+(2 a b + C) / (a^2 + b^2 + C).  It punishes differences about mid-grey, where a and b pass through 0, and forgives them
+in the dark.  In one thing we differ: Spike-Zoo leaves PSNR's peak to scikit-image, which takes 1 in place of 2, 6 dB
 less, for a picture that nowhere is darker than mid-grey.
 
 Source: K. Chen et al., https://github.com/chenkang455/Spike-Zoo (v0.2.3): `metrics/__init__.py`,
@@ -49,10 +47,18 @@ def evaluate_spikezoo(
 ) -> dict[str, Any]:
     """Evaluate on the clips of a folder.
 
-    rate: light [spikes/frame] of white; spikes and rate planes are divided by it.
-    Returns "rows": per row (noisy and each mode, by TFP, TFI and, for modes, the rate plane) the mean of `MEASURES`
-    over the clips and its spread; "clips": the same of each clip; "settings".
-    Errors: InputError for a folder of another layout, a clip of fewer than 41 frames, and weights that do not load.
+    Args:
+        folder: in Spike-Zoo's layout.
+        modes: denoisers to judge.
+        weights: checkpoint by mode, instead of the shipped ones.
+        rate: light [spikes/frame] of white; spikes and rate planes are divided by it.
+
+    Returns:
+        "rows": per row (noisy and each mode, by TFP, TFI and, for modes, the rate plane) the mean of `MEASURES` over
+        the clips and its spread; "clips": the same of each clip; "settings".
+
+    Raises:
+        InputError: a folder of another layout, a clip of fewer than 41 frames, and weights that do not load.
     """
     rate = checked_number(rate, "rate", *WHITES, unit="spikes/frame")
     online = denoisers(modes, weights)

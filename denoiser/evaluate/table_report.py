@@ -7,6 +7,7 @@ from typing import Any
 
 from denoiser.evaluate.judge import COLUMNS, PLANE
 from denoiser.evaluate.rows import ROWS
+from denoiser.evaluate.writing import number
 
 WIDTH = 41
 """Of the column of rows: the longest title with the size of its network."""
@@ -18,8 +19,6 @@ def report(result: dict[str, Any]) -> str:
     parts = [f"{result['title']}\n{of}"]
     for group in result["groups"]:
         parts += [_pictures(group, result["rows"], result["parameters"]), *_measures(group, result["rows"])]
-    if result["figures"]:
-        parts.append(_figures(result["figures"]))
     if result["missing"]:
         parts.append("not there:\n" + "\n".join(f"  {name}: {why}" for name, why in result["missing"].items()))
     return "\n\n".join(parts) + "\n"
@@ -32,7 +31,7 @@ def _of(settings: dict[str, Any]) -> str:
 
 
 def _repeated(counted: dict[str, Any]) -> str:
-    """What the spreads are over."""
+    """The repetitions over which the spreads are."""
     return f"{counted['seeds']} instants" if counted["seeds_are_instants"] else f"seeds: {counted['seeds']}"
 
 
@@ -72,30 +71,14 @@ def _measures(group: dict[str, Any], rows: Sequence[str]) -> list[str]:
     ]
     for row, m in found.items():
         size = None if m["bias"] is None else 100 * m["bias"]
-        places = " ".join(_number(db, 4, 1) for db in m["db_by_place"])
+        places = " ".join(number(db, 4, 1) for db in m["db_by_place"])
         lines.append(
-            f"{ROWS[row].title:{WIDTH}}| {_number(size, 7, 2)} {_number(m['lag'], 6, 2)} "
-            f"| {_number(m['mean_plane']['db'], 13, 2)} {_number(m['mean_plane']['ssim'], 6, 3)} "
-            f"| {_number(m['flicker'], 7, 2)} {_number(m['texture'], 8, 2)} "
-            f"| {_number(m['mean_db'], 7, 2)} {_number(m['last_db'], 8, 2)} | {places}".rstrip()
+            f"{ROWS[row].title:{WIDTH}}| {number(size, 7, 2)} {number(m['lag'], 6, 2)} "
+            f"| {number(m['mean_plane']['db'], 13, 2)} {number(m['mean_plane']['ssim'], 6, 3)} "
+            f"| {number(m['flicker'], 7, 2)} {number(m['texture'], 8, 2)} "
+            f"| {number(m['mean_db'], 7, 2)} {number(m['last_db'], 8, 2)} | {places}".rstrip()
         )
     return ["\n".join(lines)]
-
-
-def _figures(promised: Sequence[dict[str, Any]]) -> str:
-    """Those found beside those wanted, and how many could not be."""
-    words = {True: "yes", False: "NO", None: "-"}
-    found = [f for f in promised if f["found"] is not None]
-    width = max((len(f["what"]) for f in found), default=0)
-    wanted = max((len(f["wanted"]) for f in found), default=0)
-    lines = [f"{'figure':{width}} | {'wanted':{wanted}} |    found | holds | interval, speed"] if found else []
-    for f in found:
-        group = f"{f['interval']:g}, {f['speed']:g}" if f["interval"] else ""
-        lines.append(
-            f"{f['what']:{width}} | {f['wanted']:{wanted}} | {f['found']:8g} | {words[f['holds']]:5} | {group}".rstrip()
-        )
-    left = len(promised) - len(found)
-    return "\n".join([*lines, *([f"figures that need rows or columns not in this table: {left}"] if left else [])])
 
 
 def _cell(score: dict[str, float | None] | None) -> str:
@@ -103,12 +86,8 @@ def _cell(score: dict[str, float | None] | None) -> str:
         return f"{'-':>5}"
     gap = score.get("gap_closed")
     share = "" if gap is None else f"{100 * gap:4.0f} %"
-    return f"{score['db']:5.2f} {_number(score['db_spread'], 4, 2)} {_number(score['ssim'], 5, 3)} {share}"
+    return f"{score['db']:5.2f} {number(score['db_spread'], 4, 2)} {number(score['ssim'], 5, 3)} {share}"
 
 
 def _niqe(score: dict[str, float | None] | None) -> str:
-    return f"{'-':>5}" if score is None else _number(score["niqe"], 5, 2)
-
-
-def _number(value: float | None, width: int, digits: int) -> str:
-    return f"{'-':>{width}}" if value is None else f"{value:{width}.{digits}f}"
+    return f"{'-':>5}" if score is None else number(score["niqe"], 5, 2)

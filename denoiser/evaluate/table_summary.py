@@ -16,8 +16,12 @@ Mean = dict[str, float | None]
 def groups(records: Sequence[RowResult]) -> list[dict[str, Any]]:
     """Records by mean interval and speed, each with the means of its rows.
 
-    A group: interval, speed, scenes, seeds, and rows: row -> {pictures: column -> {db, db_spread, ssim, ssim_spread,
-    niqe, gain_db, gain_ssim, gap_closed}, and the other measures of a `RowResult`, by name}.
+    Args:
+        records: of many scenes and seeds.
+
+    Returns:
+        Groups: interval, speed, scenes, seeds, and rows: row -> {pictures: column -> {db, db_spread, ssim, ssim_spread,
+            niqe, gain_db, gain_ssim, gap_closed}, and the other measures of a `RowResult`, by name}.
     """
     kinds = dict.fromkeys((r.interval, r.speed) for r in records)
     return [_group(*kind, [r for r in records if (r.interval, r.speed) == kind]) for kind in kinds]
@@ -77,16 +81,10 @@ def _by_place(records: list[RowResult]) -> list[float | None]:
 
 
 def _compare(score: Mean, noisy: Mean | None, clean: Mean | None) -> None:
-    """Add what the row gains over noisy, and the share of the way to the clean twin."""
+    """Add the row's gain over noisy, and the share of the way to the clean twin."""
     if noisy is None or score["db"] is None or noisy["db"] is None or score["ssim"] is None or noisy["ssim"] is None:
         return
     score["gain_db"] = plain(score["db"] - noisy["db"])
     score["gain_ssim"] = plain(score["ssim"] - noisy["ssim"])
     if clean is not None and clean["db"] is not None:
         score["gap_closed"] = plain(gap_closed(noisy["db"], score["db"], clean["db"]))
-
-
-def best_picture(found: dict[str, Any]) -> tuple[str, float] | None:
-    """The column under which a row's mean is highest, and that mean [dB]; its rate plane counts."""
-    known = {c: s["db"] for c, s in found["pictures"].items() if s["db"] is not None}
-    return max(known.items(), key=lambda item: item[1]) if known else None

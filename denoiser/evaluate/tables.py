@@ -1,4 +1,4 @@
-"""The paper's tables, and what it has none for: dim light, fast motion, scenes at rest.
+"""The paper's tables, and others: dim light, fast motion, scenes at rest.
 
     table1   PHM_N: noisy, the paper's pipelines, `paper`, `best`, the clean twin, under five reconstructions
     table2   the same on real recordings, by NIQE
@@ -6,7 +6,7 @@
     table4   the same on real recordings
     still    collages at rest: the mean and the last of 400 frames, with and without a calibration of the camera
 
-    result = evaluate_table("table1", Asked(out=Path("evaluation"), jobs=2))
+    result = evaluate_table("table1", TableRequest(out=Path("evaluation"), jobs=2))
     print(report(result))
 
 A table that was stopped goes on where it was, in the same folder.
@@ -24,10 +24,9 @@ from tqdm import tqdm
 
 from denoiser.evaluate import phm, real, still
 from denoiser.evaluate.exposed import CLASSICAL, StreamCase
-from denoiser.evaluate.figures import figures
 from denoiser.evaluate.judge import COLUMNS, RowResult
 from denoiser.evaluate.page import write_page
-from denoiser.evaluate.rows import BEFORE, ROWS, Weights, parameters, why_not
+from denoiser.evaluate.rows import ROWS, Weights, parameters, why_not
 from denoiser.evaluate.table_report import report
 from denoiser.evaluate.table_summary import groups
 from denoiser.evaluate.work import Results, tasks, undone, work
@@ -64,10 +63,11 @@ LEAST_FRAMES = 2 * phm.WARM_UP
 
 @dataclass(frozen=True)
 class Table:
-    """kind: of its cases (`exposed.Case`)."""
+    """A table of the paper."""
 
     title: str
     kind: str
+    """Of its cases (`exposed.StreamCase`)."""
     rows: tuple[str, ...]
 
 
@@ -82,57 +82,70 @@ TABLES = {
 
 @dataclass(frozen=True)
 class TableRequest:
-    """What a table is made of; what is not said is the table's own.
-
-    scenes: of the catalogue; at rest, how many a class are `still_scenes`.  shape: (rows, columns).  seeds: cameras
-    before each scene.  intervals: mean frames between spikes.  speeds: [pixels/frame], 0 the scene's own.  frames: of
-    each stream.  rows: of `rows.ROWS`.  data: a dataset to take streams from.  real: folder of real recordings.
-    out: folder for results, pictures and the page; None prints only.  jobs: processes.
-    """
+    """Contents and place of a table."""
 
     scenes: tuple[str, ...] = phm.SCENES
+    """Of the catalogue."""
     still_scenes: int = 2
+    """Scenes at rest of each class."""
     shape: tuple[int, int] | None = None
+    """(rows, columns); default the table's."""
     seeds: int = 3
+    """Cameras before each scene."""
     intervals: tuple[float, ...] = (10.0,)
+    """Mean frames between spikes."""
     speeds: tuple[float, ...] = (0.0,)
+    """[pixels/frame]; 0: the scene's own."""
     frames: int | None = None
+    """Of each stream; default the table's."""
     rows: tuple[str, ...] = ()
+    """Of `rows.ROWS`; default the table's."""
     data: Path | None = None
+    """A dataset from which streams are taken."""
     real: Path = real.FOLDER
+    """Folder of real recordings."""
     weights: Weights = field(default_factory=Weights)
     out: Path | None = None
+    """Folder for results, pictures and the page; None: none."""
     jobs: int = 1
+    """Processes."""
 
 
-def evaluate_table(name: str, asked: TableRequest | None = None, *, progress: bool = False) -> dict[str, Any]:
-    """A table of `TABLES`; `report` shows the result as text.
+def evaluate_table(name: str, request: TableRequest | None = None, *, progress: bool = False) -> dict[str, Any]:
+    """Make a table; `report` shows the result as text.
 
-    Returns table, title, rows, settings, groups (see `table_summary.groups`), scenes (every record), missing (why rows,
-    columns or recordings are not there), parameters (weights of the rows' networks) and figures (see
-    `figures.figures`).
-    Raises InputError for unknown names, too few frames, a folder of recordings that is not there, and a folder in which
-    another run is at work, or that holds results of other settings.
+    Args:
+        name: of `TABLES`.
+        request: contents; default those of the paper.
+        progress: shows a bar.
+
+    Returns:
+        table, title, rows, settings, groups (see `table_summary.groups`), scenes (every record), missing (why rows,
+        columns or recordings are missing), parameters (weights of the rows' networks).
+
+    Raises:
+        InputError: unknown names, too few frames, a folder of recordings that does not exist; another run at work in
+            `out`, or results of other settings in it.
     """
     if name not in TABLES:
         raise unknown_name("table", name, TABLES)
-    table, asked = TABLES[name], asked or TableRequest()
-    rows = _rows(table, asked)
-    asked.weights.check()
-    cases, missing = _cases(table, asked)
+    table, request = TABLES[name], request or TableRequest()
+    rows = _rows(table, request)
+    request.weights.check()
+    cases, missing = _cases(table, request)
     _check_memory(cases)
-    missing |= {row: why for row in rows if (why := why_not(ROWS[row].source, asked.weights))}
-    missing |= {c: why for c in COLUMNS if c not in CLASSICAL and (why := asked.weights.missing(c))}
+    missing |= {row: why for row in rows if (why := why_not(ROWS[row].source, request.weights))}
+    missing |= {c: why for c in COLUMNS if c not in CLASSICAL and (why := request.weights.missing(c))}
     here = [row for row in rows if row not in missing]
     columns = [column for column in COLUMNS if column not in missing]
-    sizes = {row: parameters(ROWS[row].source, asked.weights) for row in here}
-    if asked.out is None:
-        records = _made(cases, here, columns, asked, Results.opened(None, {}), None, progress)
+    sizes = {row: parameters(ROWS[row].source, request.weights) for row in here}
+    if request.out is None:
+        records = _made(cases, here, columns, request, Results.opened(None, {}), None, progress)
         return _result(name, rows, cases, records, missing, sizes)
-    with run_folder(asked.out, "a table") as folder:
-        results = Results.opened(folder / f"{name}.jsonl", _settings(asked))
+    with run_folder(request.out, "a table") as folder:
+        results = Results.opened(folder / f"{name}.jsonl", _settings(request))
         with made_folder(folder / "pictures", "pictures") as pictures:
-            records = _made(cases, here, columns, asked, results, pictures, progress)
+            records = _made(cases, here, columns, request, results, pictures, progress)
         result = _result(name, rows, cases, records, missing, sizes)
         write_text_whole(folder / f"{name}.json", json.dumps(result, indent=1) + "\n")
         write_text_whole(folder / f"{name}.txt", report(result))
@@ -140,64 +153,66 @@ def evaluate_table(name: str, asked: TableRequest | None = None, *, progress: bo
     return result
 
 
-def _rows(table: Table, asked: TableRequest) -> list[str]:
-    for row in asked.rows:
+def _rows(table: Table, request: TableRequest) -> list[str]:
+    for row in request.rows:
         if row not in ROWS:
             raise unknown_name("row", row, ROWS)
-    if table.kind == "real" and (lightless := [r for r in asked.rows if ROWS[r].source in ("clean", "light")]):
+    if table.kind == "real" and (lightless := [r for r in request.rows if ROWS[r].source in ("clean", "light")]):
         raise InputError(f"row {lightless[0]!r} needs the true light, which real recordings do not have")
-    wanted = {"noisy", *(asked.rows or table.rows), *({BEFORE} & set(asked.weights.files))}
+    wanted = {"noisy", *(request.rows or table.rows)}
     return [row for row in ROWS if row in wanted]
 
 
-def _cases(table: Table, asked: TableRequest) -> tuple[list[StreamCase], dict[str, str]]:
-    """The cases, and by name why others are not there."""
+def _cases(table: Table, request: TableRequest) -> tuple[list[StreamCase], dict[str, str]]:
+    """The cases, and by name why others are missing."""
     if table.kind == "real":
-        if asked.real != real.FOLDER and not asked.real.is_dir():
-            raise InputError(f"there is no folder {asked.real}; give the folder of the recordings")
-        paths = [asked.real / name for name in real.RECORDINGS]
+        if request.real != real.FOLDER and not request.real.is_dir():
+            raise InputError(f"there is no folder {request.real}; give the folder of the recordings")
+        paths = [request.real / name for name in real.RECORDINGS]
         missing = {path.name: f"there is no recording {path}" for path in paths if not path.is_file()}
         return [case for path in paths if path.is_file() for case in real.real_cases(path)], missing
-    checked_count(asked.seeds, "seeds")
+    checked_count(request.seeds, "seeds")
     if table.kind == "still":
-        shape, frames = checked_shape(asked.shape or still.SHAPE), checked_count(asked.frames or still.FRAMES)
-        names = still.still_scenes(checked_count(asked.still_scenes, "scenes"))
-        return [StreamCase("still", n, seed, shape, frames, 0.0) for n in names for seed in range(asked.seeds)], {}
-    if asked.data is not None:
-        return [case for case in phm.dataset_cases(asked.data) if case.scene in asked.scenes], {}
-    for scene in asked.scenes:
+        shape, frames = checked_shape(request.shape or still.SHAPE), checked_count(request.frames or still.FRAMES)
+        names = still.still_scenes(checked_count(request.still_scenes, "scenes"))
+        return [StreamCase("still", n, seed, shape, frames, 0.0) for n in names for seed in range(request.seeds)], {}
+    if request.data is not None:
+        return [case for case in phm.dataset_cases(request.data) if case.scene in request.scenes], {}
+    for scene in request.scenes:
         if scene not in SCENES:
             raise unknown_name("scene", scene, SCENES)
     return [
         StreamCase(
-            "phm", scene, seed, checked_shape(asked.shape or (250, 400)), _frames(asked, interval), interval, speed
+            "phm", scene, seed, checked_shape(request.shape or (250, 400)), _frames(request, interval), interval, speed
         )
-        for interval, speed, scene, seed in product(asked.intervals, asked.speeds, asked.scenes, range(asked.seeds))
+        for interval, speed, scene, seed in product(
+            request.intervals, request.speeds, request.scenes, range(request.seeds)
+        )
     ], {}
 
 
 def _check_memory(cases: list[StreamCase]) -> None:
-    """Raises InputError where a stream and what is made of it are more than the memory."""
+    """InputError where a stream and its pictures need more than the memory."""
     for case in cases:
         size = case.frames * case.shape[0] * case.shape[1] * BYTES
         checked_memory(size, f"{case.scene}, {case.frames} frames of {case.shape[0]} x {case.shape[1]},")
 
 
-def _frames(asked: TableRequest, interval: float) -> int:
-    if asked.frames is not None and asked.frames < LEAST_FRAMES:
+def _frames(request: TableRequest, interval: float) -> int:
+    if request.frames is not None and request.frames < LEAST_FRAMES:
         raise InputError(
-            f"frames = {asked.frames}; it must be at least {LEAST_FRAMES}: the picture is of the middle frame, and "
+            f"frames = {request.frames}; it must be at least {LEAST_FRAMES}: the picture is of the middle frame, and "
             f"noisy and clean streams forget their common start in {phm.WARM_UP}"
         )
-    return asked.frames or phm.default_frames(interval)
+    return request.frames or phm.default_frames(interval)
 
 
-def _settings(asked: TableRequest) -> dict[str, Any]:
-    """What all results of a file share; scenes, seeds, intervals, speeds and rows can be added to it."""
+def _settings(request: TableRequest) -> dict[str, Any]:
+    """The settings that all results of a file share; scenes, seeds, intervals, speeds and rows can be added to it."""
     return {
-        "shape": None if asked.shape is None else list(asked.shape),
-        "frames": asked.frames,
-        "data": None if asked.data is None else str(asked.data),
+        "shape": None if request.shape is None else list(request.shape),
+        "frames": request.frames,
+        "data": None if request.data is None else str(request.data),
     }
 
 
@@ -205,17 +220,17 @@ def _made(
     cases: list[StreamCase],
     rows: list[str],
     columns: list[str],
-    asked: TableRequest,
+    request: TableRequest,
     results: Results,
     pictures: Path | None,
     progress: bool,
 ) -> list[RowResult]:
-    """All records, those that were there and those made now, in the order of cases and rows."""
+    """All records, of earlier runs and of this one, in the order of cases and rows."""
     drawn = {case.scene: case for case in reversed(cases)}  # the first of each scene
     wanted = [
         task
         for case in cases
-        for task in tasks(case, rows, columns, asked.weights, pictures if case is drawn[case.scene] else None)
+        for task in tasks(case, rows, columns, request.weights, pictures if case is drawn[case.scene] else None)
     ]
     todo = undone(wanted, results)
     bar = tqdm(
@@ -223,7 +238,7 @@ def _made(
         disable=not progress,
     )  # fmt: skip
     with bar:
-        for records in work(todo, asked.jobs):
+        for records in work(todo, request.jobs):
             results.add(records)
             bar.update()
     keys = [(c.scene, c.seed, c.interval, c.speed, row) for c in cases for row in rows]
@@ -238,7 +253,6 @@ def _result(
     missing: dict[str, str],
     sizes: dict[str, int | None],
 ) -> dict[str, Any]:
-    grouped = groups(records)
     return {
         "table": name,
         "title": TABLES[name].title,
@@ -253,7 +267,6 @@ def _result(
         },
         "missing": missing,
         "parameters": sizes,
-        "groups": grouped,
-        "figures": figures(name, grouped, records),
+        "groups": groups(records),
         "scenes": [record.model_dump() for record in records],
     }

@@ -1,11 +1,11 @@
-"""Truth tests: what a denoiser is worth where nobody knows the light, or the camera is a real one.
+"""Truth tests: the worth of a denoiser where nobody knows the light, or the camera is a real one.
 
     halves          a real recording at rest, one half denoised, the mean of the other as the truth (`halves`)
     pattern         a recording that moves, and simulated ones: fixed pattern that is left (`fixed_pattern`)
     measured        the held-out scenes of `quick`, true light, before cameras as measured (preset `measured`): once
                     with its shading, which no denoiser can tell from the scene, and once without
 
-NIQE judges a picture by itself and rewards grain; these compare with light that was seen.
+NIQE judges a picture by itself and rewards grain; these compare with the light of the scene.
 """
 
 from __future__ import annotations
@@ -36,10 +36,19 @@ def evaluate_truth(
 ) -> dict[str, Any]:
     """Run the tests; those on recordings where there are recordings.
 
-    static: a recording of a scene at rest.  moving: one in which everything moves.  scenes: simulated ones, for each
-    camera of the pattern and each class of `quick`.
-    Returns "halves", "pattern" (by recording or camera), "measured" (by camera, as `evaluate_quick`), "settings".
-    Errors: InputError for recordings that cannot be read, are too short, or dark, or nowhere at rest.
+    Args:
+        static: a recording of a scene at rest.
+        moving: a recording in which everything moves.
+        modes: denoisers to judge.
+        weights: checkpoint by mode, instead of the shipped ones.
+        scenes: simulated ones, for each camera of the pattern and each class of `quick`.
+        seed: of the simulated scenes.
+
+    Returns:
+        "halves", "pattern" (by recording or camera), "measured" (by camera, as `evaluate_quick`), "settings".
+
+    Raises:
+        InputError: recordings that cannot be read, are too short, or dark, or nowhere at rest.
     """
     recordings = {path: read_recording(Path(path)).spikes for path in (static, moving) if path is not None}
     online = denoisers(modes, weights)
@@ -65,7 +74,7 @@ def evaluate_truth(
 
 
 def cameras() -> dict[str, SensorModel]:
-    """Models of the cameras before the held-out scenes, by what the report calls them."""
+    """Models of the cameras before the held-out scenes, by their names in the report."""
     measured = SensorModel.preset("measured")
     return {"measured": measured, "measured, without shading": measured.without("vignetting")}
 

@@ -1,7 +1,8 @@
-"""Rows of cases, in this process or in several, each result saved as soon as it is there.
+"""Rows of cases, in this process or in several; each result is saved at once.
 
-A unit of work is one source (`rows.ROWS`) of one case: its rows share a run of its network.  What a results file has is
-not done again, unless the weights have changed since.
+A unit of work is one source (`rows.ROWS`) of one case: its rows share a run of its network.  Results in the file are
+not
+made again, unless the weights have changed since.
 """
 
 from __future__ import annotations
@@ -38,7 +39,7 @@ LIGHT = "light"
 
 @dataclass(frozen=True)
 class WorkItem:
-    """Some rows of one source of one case.  pictures: a folder for PNG files of what the rows show, or None."""
+    """Some rows of one source of one case."""
 
     case: StreamCase
     source: str
@@ -46,12 +47,12 @@ class WorkItem:
     columns: tuple[str, ...]
     weights: Weights
     pictures: Path | None = None
+    """A folder for PNG files of the rows' pictures, or None."""
 
 
 @dataclass(frozen=True)
 class Results:
-    """Records of a results file (JSON lines, settings first), or of none.  Raises InputError for a damaged file, and
-    for one of other settings."""
+    """Records of a results file (JSON lines, settings first), or of none."""
 
     path: Path | None
     settings: dict[str, Any]
@@ -59,7 +60,7 @@ class Results:
 
     @classmethod
     def opened(cls, path: Path | None, settings: dict[str, Any]) -> Results:
-        """What is in the file; nothing where it is not there yet."""
+        """The records of the file, if it exists; InputError where it is damaged, or of other settings."""
         if path is None or not path.exists():
             return cls(path, settings, {})
         head, *lines = read_text(path).rstrip("\n").split("\n")
@@ -92,16 +93,13 @@ def tasks(
     ]
 
 
-def undone(asked: Sequence[WorkItem], results: Results) -> list[WorkItem]:
+def undone(wanted: Sequence[WorkItem], results: Results) -> list[WorkItem]:
     """The tasks that have rows without a result, or one of other weights."""
-    return [task for task in asked if not all(_is_done(task, row, results) for row in task.rows)]
+    return [task for task in wanted if not all(_is_done(task, row, results) for row in task.rows)]
 
 
 def work(todo: Sequence[WorkItem], jobs: int = 1) -> Iterator[list[RowResult]]:
-    """Records of the tasks, as they are done.  jobs: processes; 1 works in this one.
-
-    Raises InputError where a process dies.
-    """
+    """Records of the tasks as they are done, in so many processes (1: in this one); InputError where one dies."""
     if jobs == 1 or len(todo) < 2:
         yield from map(do, todo)
         return
@@ -114,7 +112,7 @@ def work(todo: Sequence[WorkItem], jobs: int = 1) -> Iterator[list[RowResult]]:
     except BrokenProcessPool as error:
         raise InputError(
             "a worker process died, perhaps for want of memory; run the same command with fewer jobs: "
-            "it goes on with what is not done"
+            "it goes on where this one stopped"
         ) from error
     finally:
         pool.shutdown(wait=False, cancel_futures=True)
@@ -137,7 +135,7 @@ def do(task: WorkItem) -> list[RowResult]:
 
 
 def picture_path(folder: Path, case: StreamCase, row: str, column: str) -> Path:
-    """Of what a row shows in a column."""
+    """File of a row's picture in a column."""
     return folder / f"{case.scene.replace(' ', '-')}-{row}-{column}.png"
 
 

@@ -27,6 +27,11 @@ def write_result(folder: Path, name: str, result: dict[str, Any], text: str) -> 
         write_text_whole(beside / f"{name}.txt", text)
 
 
+def number(value: float | None, width: int, digits: int) -> str:
+    """A cell of a printed table."""
+    return f"{'-':>{width}}" if value is None else f"{value:{width}.{digits}f}"
+
+
 def _plain(value: Any) -> Any:
     """For JSON, which knows neither infinity nor NaN."""
     if isinstance(value, dict):

@@ -6,12 +6,12 @@
 nothing else with them.  A picture is the newest pass of the network that these frames allow:
 
     its window      unpacked, with its planes (`denoiser.window`)
-    its past        last spikes and running means: from the pass before on, or, where that is more than HISTORY frames
-                    ago, of the last HISTORY frames before the window, as if the stream had begun there
+    its past        last spikes and running means, from the pass before on.  Where that is more than HISTORY frames ago:
+                    of the last HISTORY frames before the window, as if the stream had begun there.
     gain, carried   as the pass before left them, however long ago that is
 
 Where every pass of a stream is run, pictures have the bits of `OnlineDnSS`.  Where passes are left out the network
-knows less of the past; `spikecam bench live` prints what that costs.
+knows less of the past; `spikecam bench live` prints the cost.
 """
 
 from __future__ import annotations
@@ -43,17 +43,21 @@ _LONG = 1 << 20
 
 
 class LiveDnSS:
-    """Denoised pictures of a stream of packed frames, at the instants at which they are asked for.
+    """Denoised pictures of a stream of packed frames, at the instants at which a program calls for them.
 
-    shape: (rows, columns).
-    mode: "best", "fast", "paper", or the path of a checkpoint.
-    passes: of the network for a picture, one after another; the last is shown.  More know more, and take longer.
-    plane: which frame of a pass a picture shows, 0 the oldest; default its middle, which the network knows best.
-    room: frames that are kept.
-    options: `precision` and `unit`, as of `OnlineDnSS`.
+    One thread may push while another calls `picture`.
 
-    One thread may push while another asks for pictures.
-    Errors: InputError for unknown options and unusable frames; NotReadyError for a picture before the first window.
+    Args:
+        shape: (rows, columns).
+        mode: "best", "fast", "paper", or the path of a checkpoint.
+        passes: of the network for a picture, one after another; the last is shown.  More know more, and take longer.
+        plane: frame of a pass that a picture shows, 0 the oldest; default its middle, which the network knows best.
+        room: frames that are kept.
+        options: `precision` and `unit`, as of `OnlineDnSS`.
+
+    Raises:
+        InputError: unknown options and unusable frames.
+        NotReadyError: a picture before the first window.
     """
 
     def __init__(
@@ -103,7 +107,7 @@ class LiveDnSS:
 
     @property
     def frame(self) -> int | None:
-        """Which frame of the stream the last picture showed; None before the first."""
+        """Frame of the stream in the last picture; None before the first."""
         return None if self.window is None else self.window.start + self._plane
 
     def reset(self) -> None:
@@ -111,7 +115,7 @@ class LiveDnSS:
         self.ring = Ring(self.shape, self._room)
         """Where frames are kept; a reader of files or sockets writes to it directly (`lend`, `took`)."""
         self.window: PassWindow | None = None
-        """What the network saw for the last picture; its `start` is a frame of the stream."""
+        """The network's input for the last picture; its `start` is a frame of the stream."""
         self.rates: NDArray[np.float32] | None = None
         """(planes, H, W) [spikes/frame], all frames of the last pass."""
         self._past: Past | None = None
@@ -119,24 +123,25 @@ class LiveDnSS:
         self._carried: infer.Carried = ()
 
     def warm_up(self) -> None:
-        """Do once what the first picture would do for long, such as to compile; forgets the stream."""
+        """Do the slow work of the first picture now, such as to compile; forgets the stream."""
         frames = HISTORY + self._layout.span
         self.ring.push(np.zeros((frames, self.ring.rows.shape[1]), np.uint8))
         self.picture()
         self.reset()
 
     def push(self, packed: NDArray[np.uint8]) -> None:
-        """(T, ceil(H W / 8)) uint8 more frames, packed as by `pack_frames`; raises InputError for another array."""
+        """(T, ceil(H W / 8)) uint8 more frames, packed as by `pack_frames`; InputError for another array."""
         self.ring.push(packed)
 
     def skip(self, frames: int) -> None:
-        """So many frames were lost: the stream begins anew after them; gain and what passes carried stay."""
+        """So many frames were lost: the stream begins anew after them; gain and carried arrays stay."""
         self.ring.skip(checked_count(frames, "frames"))
 
     def picture(self) -> NDArray[np.float32]:
         """(H, W) float32, the rate [spikes/frame] at `frame`; the same array until frames for another pass have come.
 
-        Raises NotReadyError while there are fewer frames than a pass needs.
+        Raises:
+            NotReadyError: there are fewer frames than a pass needs.
         """
         while not self._is_shown(newest := self._newest()):
             if all(self._pass(newest[0], start) for start in self._due(*newest)):
@@ -155,45 +160,45 @@ class LiveDnSS:
 
     def _newest_or_none(self) -> tuple[int, int] | None:
         """First frame of the stream, and of its newest whole pass."""
-        begun, stop = self.ring.extent
-        passes = (stop - begun - self._layout.future) // self.step
-        return (begun, begun + (passes - 1) * self.step) if passes > 0 else None
+        origin, stop = self.ring.extent
+        passes = (stop - origin - self._layout.future) // self.step
+        return (origin, origin + (passes - 1) * self.step) if passes > 0 else None
 
     def _newest(self) -> tuple[int, int]:
         newest = self._newest_or_none()
         if newest is None:
-            begun, stop = self.ring.extent
-            raise NotReadyError(f"{stop - begun} frames have come; the first picture needs {self.needed}, push more")
+            origin, stop = self.ring.extent
+            raise NotReadyError(f"{stop - origin} frames have come; the first picture needs {self.needed}, push more")
         return newest
 
-    def _due(self, begun: int, newest: int) -> range:
+    def _due(self, origin: int, newest: int) -> range:
         """First frames of the passes to run for a picture: the last `passes`, but for those that were run."""
-        first = max(begun, newest - (self._passes - 1) * self.step)
+        first = max(origin, newest - (self._passes - 1) * self.step)
         if self.window is not None:
             first = max(first, self.window.start + self.step)
         return range(first, newest + 1, self.step)
 
-    def _pass(self, begun: int, start: int) -> bool:
-        """Run the pass that begins at frame `start` of a stream that begins at `begun`, and keep what it leaves; false
+    def _pass(self, origin: int, start: int) -> bool:
+        """Run the pass at frame `start` of a stream that begins at `origin`, and keep its rates and state; false
         where its frames were overwritten meanwhile."""
-        first, stop = max(start - self._layout.past, begun), start + self.step + self._layout.future
-        past = self._past_before(first, begun)
+        first, stop = max(start - self._layout.past, origin), start + self.step + self._layout.future
+        past = self._past_before(first, origin)
         oldest = past.stop
         past.advance(self.ring.rows, first, self._shares)
         spikes = self.ring.unpacked(first, stop)
         if not self.ring.holds(oldest):
             self._past = None
             return False
-        self._past, origin = past, max(past.begun, first - _LONG)
+        self._past, zero = past, max(past.first, first - _LONG)
         rolling = RollingWindow(self._layout, self.shape, self._unit)
         rolling.restore(
             {
-                "start": start - origin,
-                "seen": stop - origin,
+                "start": start - zero,
+                "seen": stop - zero,
                 "frames": spikes,
-                "last": past.last_since(origin).reshape(self.shape),
+                "last": past.last_since(zero).reshape(self.shape),
                 "means": past.means.reshape(-1, *self.shape),
-                "averaged": first - origin,
+                "averaged": first - zero,
                 "sums": self._sums,
             }
         )
@@ -204,13 +209,13 @@ class LiveDnSS:
         self.window = replace(window, start=start)
         return True
 
-    def _past_before(self, first: int, begun: int) -> Past:
+    def _past_before(self, first: int, origin: int) -> Past:
         """The past to go on from to frame `first`: that of the pass before, or a new one."""
         past = self._past
-        if past is not None and past.begun >= begun and 0 <= first - past.stop <= HISTORY:
+        if past is not None and past.first >= origin and 0 <= first - past.stop <= HISTORY:
             return past
         pixels = self.shape[0] * self.shape[1]
-        return Past.nothing(max(begun, first - HISTORY), pixels, len(self._shares))
+        return Past.nothing(max(origin, first - HISTORY), pixels, len(self._shares))
 
 
 def _map(unit: Any, shape: tuple[int, int]) -> PixelMap | None:

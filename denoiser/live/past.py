@@ -24,9 +24,9 @@ _SPREAD = np.unpackbits(np.arange(256, dtype=np.uint8)[:, None], axis=1, bitorde
 
 @dataclass
 class Past:
-    """Of frames begun .. stop of a stream of P pixels."""
+    """Of frames first .. stop of a stream of P pixels."""
 
-    begun: int
+    first: int
     stop: int
     last: NDArray[np.int64]
     means: NDArray[np.float32]
@@ -76,7 +76,7 @@ def _running_means(
 
 @njit(cache=True, nogil=True, boundscheck=False)
 def _last_spikes(ring: NDArray[np.uint8], first: int, stop: int, last: NDArray[np.int64]) -> None:
-    """From the newest frame back, until every pixel of a byte has been seen to fire."""
+    """From the newest frame back, until every pixel of a byte has fired."""
     rows, size = ring.shape
     pixels = len(last)
     for j in range(size):

@@ -1,7 +1,7 @@
 """The last packed frames of a stream, in a ring that one thread fills while another reads.
 
-Frame f of the stream lies in row f % rows.  The writer never waits for the reader: a reader looks first how far the
-stream goes (`extent`), reads, and then asks whether what it read was still there (`holds`).
+Frame f of the stream lies in row f % rows.  The writer never waits for the reader.  A reader looks first how far the
+stream goes (`extent`), reads, and then calls `holds` to learn whether its frames were overwritten meanwhile.
 """
 
 from __future__ import annotations
@@ -14,21 +14,19 @@ from spikecam_env.streams.packing import packed_bytes, unpack_frames
 
 
 class Ring:
-    """room: frames that are kept.
-
-    rows     (room, ceil(H W / 8)) uint8, the packed frames
-    extent   (first, stop): the newest frames without a gap, by number; `first` may be overwritten since
-    """
+    """A ring of `room` packed frames."""
 
     def __init__(self, shape: tuple[int, int], room: int) -> None:
         self.shape = shape
         self.rows = np.empty((room, packed_bytes(shape)), np.uint8)
+        """(room, ceil(H W / 8)), the packed frames."""
         self.rows.fill(0)  # memory is given now, not while frames come
         self.extent = (0, 0)
+        """(first, stop): the newest frames without a gap, by number; `first` may be overwritten since."""
         self._lent = 0  # frames up to here may be being written
 
     def push(self, packed: NDArray[np.uint8]) -> None:
-        """(T, ceil(H W / 8)) uint8 more frames, as `streams.packing` packs them; raises InputError for others."""
+        """(T, ceil(H W / 8)) uint8 more frames, as `streams.packing` packs them; InputError for others."""
         width = self.rows.shape[1]
         if not isinstance(packed, np.ndarray) or packed.dtype != np.uint8 or packed.shape[1:] != (width,):
             kind = f"{packed.dtype} {packed.shape}" if isinstance(packed, np.ndarray) else type(packed).__name__
@@ -43,7 +41,7 @@ class Ring:
             packed = packed[len(place) :]
 
     def lend(self, most: int) -> NDArray[np.uint8]:
-        """Rows for the next frames, `most` or fewer, to be filled from the first on; `took` then says how many were."""
+        """Rows for the next frames, `most` or fewer, to be filled from the first on; `took` then takes their number."""
         stop = self.extent[1]
         row = stop % len(self.rows)
         place = self.rows[row : row + most]
@@ -57,8 +55,8 @@ class Ring:
 
     def skip(self, frames: int) -> None:
         """So many frames of the stream were lost here."""
-        begun = self.extent[1] + frames
-        self.extent = (begun, begun)
+        first = self.extent[1] + frames
+        self.extent = (first, first)
 
     def holds(self, frame: int) -> bool:
         """Whether a frame of the extent, and all after it, are not overwritten, nor about to be."""

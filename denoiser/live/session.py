@@ -1,10 +1,10 @@
 """A stream taken in as it comes by one thread, and denoised picture by picture by another.
 
-    source ──reader──▶ ring of LiveDnSS ──denoiser──▶ newest picture ──▶ whoever shows it
+    source ──reader──▶ ring of LiveDnSS ──denoiser──▶ newest picture ──▶ screen, window or film
 
-The reader takes a source that waits, a file, at the pace of a camera that sends it: what it has not taken BUFFER_S
-after it was due is lost, and counted.  Other sources are read as fast as they bring frames, and wait where that is too
-slow.
+The reader takes a source that waits, a file, at the pace of a camera that sends it.  Frames that it has not taken
+BUFFER_S after they were due are lost, and counted.  Other sources are read as fast as they bring frames, and wait where
+that is too slow.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from spikecam_env.errors import InputError
 from spikecam_env.streams.sources import Source
 
 PICTURES_S = 30.0
-"""Pictures a second: what an eye sees as motion."""
+"""Pictures a second; the eye sees them as motion."""
 BUFFER_S = 0.1
 """For which frames wait for a reader that is late [s]: 50 MB of a camera of 250 x 400 at 40 kHz."""
 LEAVE_S = 0.5
@@ -37,27 +37,33 @@ TICK_S = 0.002
 
 @dataclass(frozen=True)
 class Shown:
-    """A picture: denoised rate and noisy spikes over the window it was made from, (H, W) float32 [spikes/frame]; which
-    frame it shows; the time [s] from that frame's coming to the picture."""
+    """A picture and its frame."""
 
     rate: NDArray[np.float32]
+    """(H, W) denoised [spikes/frame]."""
     noisy: NDArray[np.float32]
+    """(H, W) mean of the spikes over the window [spikes/frame]."""
     frame: int
+    """The frame that the picture shows."""
     latency_s: float
+    """From that frame's arrival to the picture."""
 
 
 @dataclass(frozen=True)
 class Figures:
-    """Since the first frame: seconds; frames that came, and that were lost; pictures, and the latency of all [s]."""
+    """Sums since the first frame."""
 
     seconds: float
     frames: int
+    """That came."""
     lost: int
+    """Frames."""
     pictures: int
     latency_s: float
+    """Of all pictures together."""
 
     def since(self, before: Figures) -> Figures:
-        """What has been added to earlier ones."""
+        """The difference to earlier ones."""
         return Figures(*(now - then for now, then in zip(vars(self).values(), vars(before).values(), strict=True)))
 
     @property
@@ -85,12 +91,20 @@ NOTHING = Figures(0.0, 0, 0, 0, 0.0)
 
 
 class Session:
-    """Takes a source in and denoises it inside its `with` block.  The denoiser forgets what it had before.
+    """Takes a source in and denoises it inside its `with` block.  The denoiser forgets its stream.
 
-    speed: of a source that waits, 1 being its frame rate.  pictures: a second, at most.  frames, seconds: after which
-    the session is over; None: when its source is.
-    What a thread raised, InputError for a stream that breaks, `over` and `newest` raise.
-    Raises InputError for a denoiser of frames of another size.
+    `over` and `newest` raise the error of a thread, InputError for a stream that breaks.
+
+    Args:
+        source: of packed frames.
+        live: the denoiser.
+        speed: of a source that waits, 1 being its frame rate.
+        pictures: a second, at most.
+        frames: after which the session is over; None: when its source is.
+        seconds: after which the session is over; None: when its source is.
+
+    Raises:
+        InputError: the denoiser is for frames of another size.
     """
 
     def __init__(
@@ -116,7 +130,7 @@ class Session:
         self._shown: Shown | None = None
         self._error: BaseException | None = None
         self._arrivals: deque[tuple[int, float]] = deque(maxlen=4096)
-        self._begun_s = self._ended_s = 0.0
+        self._start_s = self._ended_s = 0.0
         self._taken = self._lost = self._pictures = 0
         self._latency_s = 0.0
 
@@ -144,11 +158,11 @@ class Session:
     @property
     def figures(self) -> Figures:
         until = self._ended_s if self._denoised_all.is_set() else time.perf_counter()
-        seconds = until - self._begun_s if self._begun_s else 0.0
+        seconds = until - self._start_s if self._start_s else 0.0
         return Figures(seconds, self._taken, self._lost, self._pictures, self._latency_s)
 
     def newest(self, after: Shown | None, timeout_s: float) -> Shown | None:
-        """The newest picture, once it is another than `after`, waited for so long; None where there is none."""
+        """The newest picture, once it is another than `after`, within a time; None where there is none."""
         with self._changed:
             self._changed.wait_for(lambda: self._shown is not after or self.over, timeout_s)
             return None if self._shown is after else self._shown
@@ -175,7 +189,7 @@ class Session:
                 return
 
     def _is_time_up(self) -> bool:
-        taken_s = time.perf_counter() - self._begun_s if self._begun_s else 0.0
+        taken_s = time.perf_counter() - self._start_s if self._start_s else 0.0
         return self._stop.is_set() or (self._seconds is not None and taken_s > self._seconds)
 
     def _left(self) -> int:
@@ -187,8 +201,8 @@ class Session:
         if self._rate is None:
             return BLOCK
         now = time.perf_counter()
-        self._begun_s = self._begun_s or now
-        due = int((now - self._begun_s) * self._rate) - self._taken - self._lost
+        self._start_s = self._start_s or now
+        due = int((now - self._start_s) * self._rate) - self._taken - self._lost
         late = due - int(BUFFER_S * self._rate)
         if late > 0:
             self._source.skip(late)
@@ -199,7 +213,7 @@ class Session:
 
     def _take(self, count: int) -> None:
         now = time.perf_counter()
-        self._begun_s = self._begun_s or now
+        self._start_s = self._start_s or now
         self.live.ring.took(count)
         self._taken += count
         self._arrivals.append((self.live.count, now))
@@ -229,7 +243,7 @@ class Session:
             self._changed.notify_all()
 
     def _came_at(self, frame: int) -> float:
-        """When a frame was taken in [s]."""
+        """Time of a frame's arrival [s]."""
         came = time.perf_counter()
         for count, at in reversed(list(self._arrivals)):
             if count <= frame:

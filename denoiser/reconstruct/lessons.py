@@ -1,4 +1,4 @@
-"""What a reconstructor is taught: the networks that learn, what they look at, and the loss of each stream.
+"""The training of a reconstructor: networks, windows, and the loss of each stream.
 
     d(p, q) = mean (p - q)^2 / (max(p, 0) + 0.05)          no gradient through the divisor and through q
 
@@ -31,14 +31,14 @@ LABEL_REACH = 40
 
 @dataclass(frozen=True)
 class LessonWindows:
-    """Of many streams: spikes (N, T, H, W) uint8 and light (N, T, H, W) float32 of the last T frames.
-
-    old: (N,) bool, whether all T frames are of one stream.
-    """
+    """The last T frames of many streams."""
 
     spikes: Tensor
+    """(N, T, H, W) uint8."""
     light: Tensor
+    """(N, T, H, W) float32."""
     old: Tensor
+    """(N,) bool, whether all T frames are of one stream."""
 
     def copy(self) -> LessonWindows:
         """The same frames, to keep."""
@@ -51,10 +51,12 @@ class LessonWindows:
 
 
 class Lesson(Protocol):
-    """span: frames of the windows.  networks: what learns; "student" is the one that is written down."""
+    """Networks that learn, and their loss."""
 
     span: int
+    """Frames of the windows."""
     networks: nn.ModuleDict
+    """"student" is the one that is written down."""
 
     def losses(self, windows: LessonWindows, number_type: torch.dtype) -> Tensor:
         """(N,) float32, a loss for each stream."""

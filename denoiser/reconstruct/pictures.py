@@ -51,11 +51,10 @@ def reconstruct(
     weights: str | os.PathLike[str] | None = None,
     precision: str = "float32",
 ) -> NDArray[np.float32]:
-    """(T, H, W) spikes -> (H, W) float32 light at frame t [spikes/frame], in [0, 1].
+    """(T, H, W) spikes -> (H, W) float32 light at frame t [spikes/frame], in [0, 1]: `reconstruct_many` of one frame.
 
-    Args: as `reconstruct_many`.
-    Raises: InputError as `reconstruct_many`.
-    Example: reconstruct("spk2img-noisy", spikes, 100)
+    Example:
+        reconstruct("spk2img-noisy", spikes, 100)
     """
     light: NDArray[np.float32] = reconstruct_many(name, spikes, [t], weights=weights, precision=precision)[0]
     return light
@@ -77,6 +76,7 @@ def reconstruct_many(
         frames: numbers from 0 to T - 1, in any order.
         weights: a checkpoint of `spikecam train`, for a learned one, instead of the shipped weights.
         precision: of PRECISIONS; float32 gives nearly the same on every machine, bfloat16 is faster on some.
+
     Raises:
         InputError: another name or precision, an unusable stream, a frame outside of it, an unusable checkpoint.
     """

@@ -1,4 +1,4 @@
-"""The learned reconstructors by name: which network, how wide, and which spikes it learns from."""
+"""The learned reconstructors by name: network, width, and the spikes from which it learns."""
 
 from __future__ import annotations
 
@@ -22,11 +22,14 @@ NETWORKS = {"spk2imgnet": Spk2ImgNet, "ssml": Student}
 
 @dataclass(frozen=True)
 class ReconstructorRecipe:
-    """architecture: of `NETWORKS`.  learns_from: the spikes it is shown in training.  width: channels of its body."""
+    """Network and training spikes of a reconstructor."""
 
     architecture: str
+    """Of `NETWORKS`."""
     learns_from: str
+    """Spikes of its training, "clean" or "noisy"."""
     width: int = 48
+    """Channels of its body."""
 
     def network(self) -> nn.Module:
         """The untrained network: (N, 41, H, W) spikes -> (N, 1, H, W) float32 light [spikes/frame]."""
@@ -38,7 +41,7 @@ class ReconstructorRecipe:
 
     @classmethod
     def from_dict(cls, data: Any, where: str = "recipe") -> ReconstructorRecipe:
-        """The inverse of `to_dict`; raises InputError for anything else.  where: begins the error's text."""
+        """The inverse of `to_dict`; InputError for anything else, whose text `where` begins."""
         return cls(**declared(_DeclaredRecipe, data, where).model_dump())
 
 
@@ -56,10 +59,8 @@ LEARNED = {
 
 
 def reconstructor_recipe(name: str, width: int | None = None) -> ReconstructorRecipe:
-    """The recipe of a learned reconstructor, of another width where one is given.
-
-    Raises InputError for another name, and for a width out of range.
-    """
+    """The recipe of a learned reconstructor, of another width where one is given; InputError for another name, and for
+    a width out of range."""
     if not isinstance(name, str) or name not in LEARNED:
         raise unknown_name("learned reconstructor", name, LEARNED)
     return LEARNED[name] if width is None else replace(LEARNED[name], width=_checked_width(width))

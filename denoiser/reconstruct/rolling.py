@@ -10,10 +10,7 @@ from denoiser.simulated import SimulatedStreams
 
 
 class RollingWindows:
-    """Windows of `span` frames of every stream; a window counts once its stream is that old.
-
-    spikes: "clean" or "noisy".  All is kept in place, as `denoiser.captured` wants it.
-    """
+    """Windows of `span` frames of every stream, of clean or noisy spikes, changed in place (`denoiser.captured`)."""
 
     def __init__(self, streams: SimulatedStreams, spikes: str, span: int) -> None:
         self.streams, self._kind = streams, spikes

@@ -9,9 +9,9 @@
 Light inference filters a block over several time scales (1 to 13 frames about its centre), and weighs the scales at
 each pixel: few frames where things move, many where they do not.  Alignment runs from coarse to fine over a pyramid.
 
-What differs from the publication: each group of channels is displaced by a flow and weighed by a mask, and then
-convolved (one bilinear tap a group), where the publication has 3 x 3 deformable convolution, nine displaced taps; the
-body works on pixels folded 2 x 2 into channels, which is four times as fast; widths and depths are this file's.
+Differences from the publication: each group of channels is displaced by a flow, weighed by a mask and then convolved
+(one bilinear tap a group).  The publication has 3 x 3 deformable convolution, nine displaced taps.  The body works on
+pixels folded 2 x 2 into channels, which is four times as fast; widths and depths are this file's.
 
 Source: Zhao et al., "Spk2ImgNet: Learning to reconstruct dynamic scene from continuous spike stream", CVPR 2021.
 """
@@ -136,9 +136,11 @@ class Spk2ImgNet(nn.Module):
 
 
 def displace(features: Tensor, moves: Tensor) -> Tensor:
-    """Features (N, C, H, W), each group of channels read where its displacement says, times its weight.
+    """Features, each group of channels read where its displacement points, times its weight.
 
-    moves: (N, 3 GROUPS, H, W), for every group rows, columns [pixels], and the weight's logit (0: weight 1).
+    Args:
+        features: (N, C, H, W).
+        moves: (N, 3 GROUPS, H, W), for every group rows, columns [pixels], and the weight's logit (0: weight 1).
     """
     count, channels, height, width = features.shape
     rows, columns, logit = moves.float().reshape(count * GROUPS, 3, height, width).unbind(1)

@@ -1,7 +1,7 @@
 """SSML: pictures learned from noisy spikes alone, by two networks that learn from each other.
 
-    blind    sees the neighbours of a pixel, never the pixel itself, in any frame.  What it can predict of the pixel's
-             own noisy rate is the light, for the noise of a pixel is not in its neighbours.
+    blind    sees the neighbours of a pixel, never the pixel itself, in any frame.  It can predict the light of the
+             pixel, but not its noise, which is not in the neighbours.
     student  sees everything, and is the network that is used.
 
     label = TFI of the noisy stream at the middle frame                    its mean over time is the pixel's rate
@@ -9,8 +9,8 @@
 
 each with no gradient through the second argument.  With w = 0 the student would learn to do without the pixel itself.
 
-What differs from the publication (its full text was not at hand; its abstract and the shapes of its published weights
-were): the blind network is of masked and dilated convolutions, the weights w and v are this file's, and the student
+Differences from the publication (its full text was not at hand; its abstract and the shapes of its published weights
+were): the blind network is of masked and dilated convolutions, and the weights w and v are this file's.  The student
 works on pixels folded 2 x 2, with 0.37 M parameters.  The published student is a U-Net of two levels too, 0.90 M.
 
 Sources: Chen et al., "Self-supervised mutual learning for dynamic scene reconstruction of spiking camera", IJCAI 2022;
@@ -67,8 +67,9 @@ class DilatedResidual(nn.Module):
 class Blind(nn.Module):
     """(N, 41, H, W) spikes -> (N, 1, H, W) float32 light at frame 20, of every pixel without that pixel's spikes.
 
-    Behind a filter of size k that skips its middle, filters of dilation (k + 1) / 2 move by multiples of it only, and
-    so never come back to the pixel.
+    The first filter, of size k, skips its middle.  The filters after it have dilation (k + 1) / 2 and move by multiples
+    of
+    it only, so they never come back to the pixel.
     """
 
     def __init__(self, width: int = 48, depth: int = 4) -> None:
@@ -116,7 +117,8 @@ class Student(nn.Module):
 def interval_rate(spikes: Tensor, middle: int) -> Tensor:
     """(N, T, H, W) spikes -> (N, 1, H, W) float32 TFI at frame `middle`: 1 / (the interval over it) [spikes/frame].
 
-    Where an interval leaves the T frames, the mean over all of them.
+    Returns:
+        The rate; where an interval leaves the T frames, the mean over all of them.
     """
     frames = torch.arange(spikes.shape[1], device=spikes.device, dtype=torch.int16)[:, None, None]
     spiked = spikes > 0

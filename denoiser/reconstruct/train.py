@@ -1,8 +1,8 @@
 """Training a reconstructor on simulated streams as they go on, resumable at any minute.
 
-Each step moves every stream on by `frames_a_step` frames and learns from the window that ends there
-(`rolling.py`), by the loss of `lessons.py`, in the loop that all training shares (`denoiser.training_loop`).  A resumed
-run goes on with new streams.
+Each step moves every stream on by `frames_a_step` frames and learns from the window that ends there (`rolling.py`), by
+the loss of `lessons.py`.  The loop is that of all training (`denoiser.training_loop`).  A resumed run goes on with new
+streams.
 
 In `out` the run keeps `<mode>.pt` (weights), `last.pt` (to resume), `curve.json` and `curve.png`: validation on streams
 of another seed, against the true light, beside TFP 21, TFP 41 and TFI of the same windows.
@@ -11,7 +11,6 @@ of another seed, against the true light, beside TFP 21, TFP 41 and TFI of the sa
 from __future__ import annotations
 
 import math
-import os
 import time
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -20,7 +19,7 @@ from pathlib import Path
 import torch
 from torch import Tensor, nn
 
-from denoiser.captured import captured, checked_compiler
+from denoiser.captured import captured
 from denoiser.number_type import computing_in, number_type
 from denoiser.reconstruct import ssml
 from denoiser.reconstruct.lessons import Lesson, LessonWindows, lesson_of
@@ -31,11 +30,9 @@ from denoiser.reconstruct.weights import save_reconstructor
 from denoiser.run import Run
 from denoiser.simulated import UNIT_SHAPE, Bank, SimulatedStreams
 from denoiser.training_loop import RUN_FILE, learn, save_progress
+from denoiser.training_options import TrainingOptions
 from denoiser.training_record import training_record
-from spikecam_env.checked import checked_count, checked_number, checked_seed
-from spikecam_env.errors import InputError
 from spikecam_env.run_folder import run_folder
-from spikecam_env.sensor.kernels.cuda import checked_device
 from spikecam_env.torch_settings import torch_settings
 
 VALIDATION_SEED = 1_000_003  # added to the seed: other scenes, other units, other textures of the same kinds
@@ -43,78 +40,43 @@ VALIDATION_STREAMS = 64
 VALIDATION_MOMENTS = 4
 VALIDATION_TEXTURES, VALIDATION_UNITS = 32, 16
 FRAMES_BETWEEN_MOMENTS = 64
-LARGEST_SEED = 2**62
-"""So that the seed of the validation has room above it."""
-_COUNTS = {
-    "steps": 10**9,
-    "batch": 65_536,
-    "threads": 1024,
-    "patch": min(UNIT_SHAPE),
-    "frames_a_step": WINDOW,
-    "validate_every": 10**9,
-}
-"""Options that are whole numbers from 1, with the most."""
-_AMOUNTS = {"lr": 1.0, "minutes": 1e6, "save_every_s": 1e9}
-"""Options that are numbers above 0, with the most."""
 
 
 @dataclass(frozen=True)
-class ReconstructorConfig:
-    """mode: "spk2img-clean" | "spk2img-noisy" | "ssml".  out: folder.
-
-    The run ends after `steps`, or `minutes` where that is given.  width: channels; None: the recipe's.
-    batch: streams, each a window a step.  patch: their side [pixels].  frames_a_step: by which they go on.
-    lr: highest rate of learning.  validate_every: steps.  threads, device: of network and streams.
-    resume: go on from out/last.pt.
-    compiled: the simulated light by `torch.compile`, on a processor too; a GPU always does.
-    """
+class ReconstructorConfig(TrainingOptions):
+    """Options of a reconstructor's training; every stream of `batch` gives a window a step."""
 
     mode: str = "spk2img-noisy"
-    out: Path = Path("training")
-    steps: int = 20_000
+    """"spk2img-clean", "spk2img-noisy" or "ssml"."""
     batch: int = 64
-    seed: int = 0
-    threads: int = 1
-    resume: bool = True
-    minutes: float | None = None
-    patch: int = 64
-    lr: float = 1e-3
-    save_every_s: float = 60.0
     validate_every: int = 500
-    device: str = "cpu"
     width: int | None = None
+    """Channels; None: the recipe's."""
     frames_a_step: int = 12
-    compiled: bool = False
+    """Frames by which the streams go on."""
+
+    counts = TrainingOptions.counts | {"patch": (1, min(UNIT_SHAPE)), "frames_a_step": (1, WINDOW)}
 
     def __post_init__(self) -> None:
         self.recipe()
-        checked_seed(self.seed, "seed", LARGEST_SEED)
-        for name, most in _COUNTS.items():
-            checked_count(getattr(self, name), name, most)
-        for name, highest in _AMOUNTS.items():
-            if name != "minutes" or self.minutes is not None:
-                checked_number(getattr(self, name), name, 0.0, highest, above=True)
-        for name in ("resume", "compiled"):
-            if not isinstance(getattr(self, name), bool):
-                raise InputError(f"{name} is {getattr(self, name)!r}; it must be True or False")
-        if not isinstance(self.out, str | os.PathLike):
-            raise InputError(f"out is {self.out!r}; it must be the path of a folder")
-        object.__setattr__(self, "out", Path(self.out))
-        checked_device(self.device, "train with --device cpu")
-        if self.compiled:
-            checked_compiler(self.device)
+        super().__post_init__()
 
     def recipe(self) -> ReconstructorRecipe:
-        """What is trained; raises InputError for an unknown mode or width."""
+        """The recipe to train; InputError for an unknown mode or width."""
         return reconstructor_recipe(self.mode, self.width)
 
 
 def train_reconstructor(config: ReconstructorConfig, *, progress: bool = True) -> Path:
     """Train, or go on training; returns the path of the weights.
 
-    `minutes` counts from here, the drawing of textures and compilation included.
-    Raises InputError where another run is at work in `out`, or it holds the run of another mode or width, or a damaged
-    one.
+    `minutes` counts from here, with the drawing of textures and compilation.
+
+    Args:
+        config: options.
+        progress: shows a bar.
+
+    Raises:
+        InputError: another run is at work in `out`, or it holds the run of another mode or width, or a damaged one.
     """
     with run_folder(config.out, "a run of training"), torch_settings(config.threads, config.seed):
         return _trained(config, progress)
@@ -142,7 +104,7 @@ def _trained(config: ReconstructorConfig, progress: bool) -> Path:
 
 
 def _step(config: ReconstructorConfig, lesson: Lesson, run: Run, rolling: RollingWindows) -> Tensor:
-    """One step; its loss, which a GPU need not have worked out yet."""
+    """One step; its loss, which a GPU may still be computing."""
     run.optimiser.zero_grad(set_to_none=True)
     windows = rolling.advance(config.frames_a_step)
     kind = number_type("auto", windows.spikes.device)
@@ -211,14 +173,3 @@ def _save(config: ReconstructorConfig, lesson: Lesson, run: Run) -> Path:
     save_reconstructor(weights, config.mode, config.recipe(), lesson.networks["student"], record)
     save_progress(config.out, run)
     return weights
-
-
-def main() -> None:
-    """`python -m denoiser.reconstruct.train`: the options of ReconstructorConfig."""
-    import tyro
-
-    print(train_reconstructor(tyro.cli(ReconstructorConfig)))
-
-
-if __name__ == "__main__":
-    main()

@@ -14,11 +14,10 @@ from typing import Any
 import torch
 from torch import Tensor, nn
 
-from denoiser.plain_torch import read_plain, tensors_like
 from denoiser.reconstruct.recipe import LEARNED, ReconstructorRecipe
 from denoiser.threads import where_torch_can
-from denoiser.weights import digest, write_whole
-from spikecam_env.errors import InputError, shown, unknown_name
+from denoiser.weights import digest, read_checkpoint, write_whole
+from spikecam_env.errors import unknown_name
 
 FORMAT = "spikecam-reconstructor/1"
 
@@ -33,12 +32,19 @@ def save_reconstructor(
 
 
 def load_reconstructor(path: str | os.PathLike[str]) -> tuple[ReconstructorRecipe, nn.Module, dict[str, Any]]:
-    """Read a checkpoint: (recipe, network in evaluation mode with float32 weights, training record).
+    """Read a checkpoint.
 
-    Raises InputError for a missing or damaged file, a file of another kind, weights of another network, and weights
-    that are not finite or not those of the digest.
+    Args:
+        path: of the file.
+
+    Returns:
+        Recipe, network in evaluation mode with float32 weights, training record.
+
+    Raises:
+        InputError: a missing or damaged file, a file of another kind, weights of another network, and weights that are
+            not finite or not those of the digest.
     """
-    return where_torch_can(lambda: _load(path))
+    return where_torch_can(lambda: read_checkpoint(path, FORMAT, ReconstructorRecipe.from_dict, torch.float16))
 
 
 def shipped_path(name: str) -> Path:
@@ -46,22 +52,6 @@ def shipped_path(name: str) -> Path:
     if not isinstance(name, str) or name not in LEARNED:
         raise unknown_name("learned reconstructor", name, LEARNED)
     return Path(str(resources.files("denoiser") / "weights" / f"{name}.pt"))
-
-
-def _load(path: str | os.PathLike[str]) -> tuple[ReconstructorRecipe, nn.Module, dict[str, Any]]:
-    data = read_plain(path)
-    if not isinstance(data, dict) or data.get("format") != FORMAT:
-        found = data.get("format") if isinstance(data, dict) else type(data).__name__
-        raise InputError(f"{path} is not a {FORMAT} checkpoint (found {shown(found)}); give a file of `spikecam train`")
-    recipe = ReconstructorRecipe.from_dict(data.get("recipe"), f"{path}: recipe")
-    network, training = recipe.network(), data.get("training")
-    weights = tensors_like(_halves(network), data.get("state_dict"), str(path))
-    if not isinstance(training, dict):
-        raise InputError(f"{path}: training is {type(training).__name__}; it must be a table; copy the file again")
-    if data.get("sha256") != digest(recipe, weights):
-        raise InputError(f"{path} is damaged: its weights are not those of its digest; copy it again or train anew")
-    network.load_state_dict(weights)  # in float32, the type of the network
-    return recipe, network.eval(), dict(training)
 
 
 def _halves(network: nn.Module) -> dict[str, Tensor]:

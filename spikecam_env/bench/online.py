@@ -6,7 +6,6 @@ spikecam bench online
 from __future__ import annotations
 
 import time
-from importlib.util import find_spec
 from typing import Any
 
 import numpy as np
@@ -27,28 +26,26 @@ CHUNK = 16
 def bench_online(threads: tuple[int, ...] = (1, 2), seconds: float = 3.0, seed: int = 0) -> list[dict[str, Any]]:
     """Frames a second of `OnlineDnSS` on a noisy stream of the disk, by size, network evaluation stride and threads.
 
-    Of `best` and `fast` both engines, where OpenVINO is installed.
     Columns: mode, engine, size, stride (frames between network evaluations; `best` and `fast` give 16
     frames an evaluation), threads, frames/s, x paper (same size and threads, stride 1), x real time (40 000 frames a
     second), latency [frames].
     """
-    engines = ["torch", *(["openvino"] if find_spec("openvino") else [])]
-    contestants = [("paper", "torch", stride) for stride in STRIDES]
-    contestants += [(m, engine, recipe_of(m).layout.planes) for m in ("best", "fast") for engine in engines]
+    contestants = [("paper", stride) for stride in STRIDES]
+    contestants += [(mode, recipe_of(mode).layout.planes) for mode in ("best", "fast")]
     jobs = [(shape, count, *c) for shape in SHAPES for count in threads for c in contestants]
     rows: list[dict[str, Any]] = []
     base = 0.0
     with torch_settings():
-        for shape, count, mode, engine, stride in tqdm(jobs, desc="bench", unit="row", leave=False):
+        for shape, count, mode, stride in tqdm(jobs, desc="bench", unit="row", leave=False):
             torch.set_num_threads(count)
-            options: dict[str, Any] = {"stride": stride} if mode == "paper" else {"engine": engine}
+            options: dict[str, Any] = {"stride": stride} if mode == "paper" else {}
             online = OnlineDnSS.pretrained(mode, output="both", **options)
             rate = _frames_a_second(online, _stream(shape, seed), seconds)
             base = rate if (mode, stride) == ("paper", 1) else base
             rows.append(
                 {
                     "mode": mode,
-                    "engine": engine,
+                    "engine": "torch",
                     "size": f"{shape[0]} x {shape[1]}",
                     "stride": stride,
                     "threads": count,

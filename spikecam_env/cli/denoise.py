@@ -36,8 +36,8 @@ class Denoise:
     """Folder for denoised.h5, pictures.png, film.mp4 and summary.json."""
     mode: Mode = "best"
     """Which DnSS: `best`, `fast` (a quarter of its weights), or `paper` (the paper's network; slower)."""
-    engine: Literal["torch", "openvino"] = "torch"
-    """What computes the network; `openvino` (pip install 'spikecam-env[openvino]') takes no `paper`."""
+    engine: Literal["torch"] = "torch"
+    """The library that computes the network; there is one."""
     window: Count | None = None
     """Frames averaged in the pictures of spikes (TFP window); odd.  Default: 41, or all of a shorter recording.
     Pictures of the rate are of one frame."""

@@ -49,8 +49,6 @@ class TableOptions:
     """Weights of `paper` without its refine module, instead of the shipped ones."""
     best: Path | None = None
     """Weights of `best` to evaluate instead of the shipped ones."""
-    before: Path | None = None
-    """Earlier weights of `best`, as a row to compare with."""
     jobs: Workers = 1
     """Worker processes, one thread each; 1 works in this one, with all threads."""
 
@@ -58,7 +56,7 @@ class TableOptions:
         """The files that were given."""
         from denoiser.evaluate.rows import Weights
 
-        given = {"paper": self.paper, "paper-no-refine": self.no_refine, "best": self.best, "before": self.before}
+        given = {"paper": self.paper, "paper-no-refine": self.no_refine, "best": self.best}
         if self.weights is not None and not self.weights.is_dir():
             raise InputError(f"--weights {self.weights}: there is no such folder")
         return Weights.found(self.weights, {name: path for name, path in given.items() if path is not None})

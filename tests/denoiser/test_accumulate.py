@@ -22,17 +22,6 @@ def test_count_of_any_stretch_is_the_sum_of_its_rates_within_one():
     assert widest < 1 + 1e-9
 
 
-def test_chunks_do_not_matter():
-    given = rates(1)
-    whole, end = accumulate.step(given, accumulate.start(SHAPE))
-    state, pieces = accumulate.start(SHAPE), []
-    for chunk in np.split(given, [0, 1, 5, 300]):
-        piece, state = accumulate.step(chunk, state)
-        pieces.append(piece)
-    assert np.array_equal(np.concatenate(pieces), whole)
-    assert np.array_equal(state.charge, end.charge)
-
-
 def test_rates_outside_zero_to_one_are_cut():
     given = np.broadcast_to(np.array([-0.5, 1.5], np.float32), (10, 1, 2))
     spikes, state = accumulate.step(given, accumulate.start((1, 2)))

@@ -142,11 +142,12 @@ def test_what_is_no_recipe_is_refused(recipe, network: nn.Module) -> None:
         OnlineDnSS(recipe, network)
 
 
-def test_a_wrapped_network_has_no_device_and_no_openvino(network: nn.Module) -> None:
+def test_a_wrapped_network_has_no_device_and_removed_or_unknown_engines_are_named(network: nn.Module) -> None:
     with pytest.raises(InputError, match="and no DataParallel; leave device out"):
         OnlineDnSS(RECIPE, nn.DataParallel(network), device="cpu")
-    with pytest.raises(InputError, match="openvino"):
-        OnlineDnSS(RECIPE, nn.DataParallel(network), engine="openvino")
+    for engine, why in (("openvino", "engine 'openvino' was removed"), ("onnx", "engine 'onnx'")):
+        with pytest.raises(InputError, match=why):
+            OnlineDnSS(RECIPE, network, engine=engine)
 
 
 @pytest.mark.parametrize("given", [nn.Linear(2, 2), None, ["best"], 3])

@@ -18,7 +18,7 @@ RATES = ("frames/s", "env-steps/s", "Gpx-steps/s")
 
 @pytest.fixture(autouse=True)
 def set_back(monkeypatch):
-    """What `--quick` sets."""
+    """The sizes of `--quick`."""
     for program in (gpu, bench_cuda):
         monkeypatch.setattr(program, "SECONDS", program.SECONDS)
     monkeypatch.setattr(gpu, "RUNS", gpu.RUNS)

@@ -28,14 +28,3 @@ def test_after_a_step_up_an_interval_is_kept_to_its_end_where_the_update_shorten
     print({name: float(t.mean()) for name, t in first.items()})
     assert first["mus"].max() <= 4
     assert 15 < first["held"].mean() < 35 and first["held"].max() > 40
-
-
-def test_the_cut_into_chunks_changes_nothing() -> None:
-    rates = np.random.default_rng(0).uniform(0, 0.5, (60, *SHAPE)).astype(np.float32)
-    whole, _ = held.step(rates, held.start(SHAPE))
-    state = held.start(SHAPE)
-    pieces = []
-    for i in range(0, 60, 7):
-        spikes, state = held.step(rates[i : i + 7], state)
-        pieces.append(spikes)
-    np.testing.assert_array_equal(np.concatenate(pieces), whole)

@@ -70,9 +70,9 @@ def test_after_a_long_gap_a_picture_is_that_of_a_stream_that_began_shortly_befor
         watching.push(pack_frames(spikes[first : first + 70]))
     watching.picture()
     start = watching.window.start
-    begun = start - layout.past - HISTORY
+    origin = start - layout.past - HISTORY
     fresh = RollingWindow(layout, SHAPE)
-    (window,) = fresh.push(spikes[begun : start + layout.planes + layout.future], {start - begun})
+    (window,) = fresh.push(spikes[origin : start + layout.planes + layout.future], {start - origin})
     assert start > 1300
     np.testing.assert_array_equal(watching.window.spikes, window.spikes)
     np.testing.assert_array_equal(watching.window.planes, window.planes)
@@ -139,26 +139,26 @@ def test_a_stream_of_hours_is_denoised_as_a_young_one() -> None:
     """Frame numbers beyond 2^24 have no exact float32, and beyond 2^31 no int32."""
     spikes = stream(16 * 20)
     pictures = {}
-    for begun in (0, 16 * (1 << 30)):
+    for lost in (0, 16 * (1 << 30)):
         watching = live()
-        if begun:
-            watching.skip(begun)
+        if lost:
+            watching.skip(lost)
         for first in range(0, len(spikes), 16):
             watching.push(pack_frames(spikes[first : first + 16]))
             if watching.ready():
-                pictures.setdefault(begun, []).append(watching.picture())
-        assert watching.frame == begun + 296
+                pictures.setdefault(lost, []).append(watching.picture())
+        assert watching.frame == lost + 296
     np.testing.assert_array_equal(*pictures.values())
 
 
 def test_an_old_past_is_that_of_a_young_one_but_for_its_age() -> None:
     packed = pack_frames(stream(96))
     shares = np.array([1 / 64], np.float32)
-    young, old = (Past.nothing(begun, 117, 1) for begun in (0, 96 * 10**8))
+    young, old = (Past.nothing(first, 117, 1) for first in (0, 96 * 10**8))
     for past in (young, old):
-        past.advance(packed, past.begun + 96, shares)
+        past.advance(packed, past.first + 96, shares)
     np.testing.assert_array_equal(young.means, old.means)
-    np.testing.assert_array_equal(young.last_since(0), old.last_since(old.begun))
+    np.testing.assert_array_equal(young.last_since(0), old.last_since(old.first))
     assert np.all(old.last_since(old.stop) <= 0)
 
 

@@ -19,7 +19,7 @@ RATE_HZ = 2000.0
 
 
 class MadeUp:
-    """Frames of random bits.  stall_s: what the third read takes.  broken: what the read after 200 frames raises."""
+    """Frames of random bits.  stall_s: of the third read.  broken: error of the read after 200 frames."""
 
     title, shape, frame_rate_hz, cut = "made up", SHAPE, RATE_HZ, ""
 

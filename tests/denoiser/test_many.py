@@ -26,7 +26,7 @@ def streams(count: int, frames: int) -> np.ndarray:
 
 
 def pushed(many: ManyDnSS, spikes: np.ndarray, cut: int) -> list[np.ndarray]:
-    """What came out of every stream, piece by piece."""
+    """The output of every stream, piece by piece."""
     pieces = [many.push(spikes[:, first : first + cut]) for first in range(0, spikes.shape[1], cut)]
     return [np.concatenate(its) for its in zip(*pieces, strict=True)]
 

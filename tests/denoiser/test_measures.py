@@ -107,8 +107,8 @@ def test_the_texture_slope_is_what_was_left_of_it_and_noise_does_not_bias_it() -
 
 
 def test_texture_is_finer_than_two_pixels() -> None:
-    """Of a fine and a coarse grating the coarse one is lost: the slope is the share of the fine one in what the
-    high-pass (1 - exp(-2 pi^2 s^2 / p^2), s = 2 pixels) leaves of both."""
+    """Of a fine and a coarse grating the coarse one is lost: the slope is the share of the fine one in both
+    after the high-pass (1 - exp(-2 pi^2 s^2 / p^2), s = 2 pixels)."""
     light = 0.3 + 0.01 * grating(6) + 0.01 * grating(16)
     passed = [1 - np.exp(-2 * np.pi**2 * 2.0**2 / p**2) for p in (6, 16)]
     expected = passed[0] ** 2 / (passed[0] ** 2 + passed[1] ** 2)

@@ -45,17 +45,6 @@ def test_incremental_decoding_is_the_literal_equation(seed):
         )
 
 
-def test_chunks_do_not_matter():
-    planes = random_planes(9)
-    whole, end = mus.step(planes, mus.start((4, 6)))
-    state, pieces = mus.start((4, 6)), []
-    for chunk in np.split(planes, [0, 1, 2, 150]):
-        piece, state = mus.step(chunk, state)
-        pieces.append(piece)
-    assert np.array_equal(np.concatenate(pieces), whole)
-    assert np.array_equal(state.wait, end.wait)
-
-
 def test_a_steady_rate_is_kept_whatever_its_fraction():
     """Rounding every interval to a frame would give 1/3 for a rate of 0.29 and 1/2 for 0.41."""
     rates = np.linspace(0.02, 0.98, 49, dtype=np.float32).reshape(7, 7)
@@ -77,10 +66,3 @@ def test_rates_beyond_what_a_pixel_can_do_are_cut():
     planes = np.array([5.0, -1.0, np.inf, 0.0], np.float32).reshape(4, 1, 1)
     spikes, state = mus.step(planes, mus.start((1, 1)))
     assert set(np.unique(spikes)) <= {0, 1} and np.isfinite(state.wait).all()
-
-
-def test_the_state_passed_in_is_not_changed():
-    state = mus.start((4, 6))
-    before = state.wait.copy()
-    mus.step(random_planes(0), state)
-    assert np.array_equal(state.wait, before)

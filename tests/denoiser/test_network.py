@@ -30,7 +30,7 @@ def test_stream_network_has_a_million_parameters():
 @pytest.mark.parametrize("mode", ["paper", "best"])
 @pytest.mark.parametrize("size", [(16, 16), (13, 18), (1, 1), (7, 30), (2, 3)])
 def test_any_size_of_frame_comes_out_as_it_went_in(mode, size):
-    """And what is carried on has the shapes that the recipe says, and goes in again."""
+    """And carried arrays have the shapes of the recipe, and go in again."""
     recipe, carried = RECIPES[mode], None
     network = recipe.network().eval()
     for _ in range(2):
@@ -52,7 +52,7 @@ def test_nothing_carried_is_zeros_carried():
         assert torch.equal(first, network(spikes, planes, zeros)[0])
         again = network(spikes, planes, (last, hidden))[0]
     assert torch.equal(last, first[:, -1:].clamp(0, 1)) and hidden.abs().max() <= 1
-    assert not torch.equal(again, first), "what is carried matters"
+    assert not torch.equal(again, first), "carried arrays matter"
 
 
 def test_an_uncalibrated_unit_ignores_the_shares_of_the_means():

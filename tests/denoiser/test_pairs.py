@@ -1,4 +1,4 @@
-"""What training and evaluation share: sensors, and the light of a frame."""
+"""Sensors, and the light of a frame, of training and evaluation."""
 
 from __future__ import annotations
 

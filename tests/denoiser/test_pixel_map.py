@@ -1,4 +1,4 @@
-"""The calibration map: from SNEE's results, from files and pairs; what is no map is refused."""
+"""The calibration map: from SNEE's results, from files and pairs; other objects are refused."""
 
 from __future__ import annotations
 
@@ -110,6 +110,19 @@ def test_a_pair_of_maps_out_of_range_is_refused_with_the_pixel(name):
     gain, dark, said = PAIRS[name]
     with pytest.raises(InputError, match=said):
         OnlineDnSS.pretrained("best", unit=(gain, dark))
+
+
+@pytest.mark.parametrize(
+    "unit",
+    [
+        *(3, None, (GAIN,), GAIN, (GAIN, GAIN, GAIN), ("gain", "dark"), (GAIN, DARK[:1]), (GAIN[0], DARK[0])),
+        *((GAIN[:0], DARK[:0]), ([[1.0], [1.0, 2.0]], DARK), (1e300 * GAIN, DARK), (GAIN, np.nan * DARK)),
+    ],
+)
+def test_other_objects_are_refused_in_one_line(unit):
+    with pytest.raises(InputError, match="map") as caught:
+        PixelMap.of(unit)
+    assert "\n" not in str(caught.value)
 
 
 def test_files_that_hold_no_map_are_refused_in_one_line(tmp_path):

@@ -1,4 +1,4 @@
-"""Checkpoints from outside: what is damaged, hostile or odd is an InputError, never another error or other weights."""
+"""Checkpoints from outside: damaged, hostile or odd ones are an InputError, never another error or other weights."""
 
 from __future__ import annotations
 
@@ -139,7 +139,7 @@ def rewritten(whole: Path, path: Path, change: Any, **options: Any) -> Path:
 
 
 def test_a_tensor_that_is_declared_larger_than_its_record_is_refused(whole: Path, tmp_path: Path) -> None:
-    """torch.load believes the number in the file, and reads what lies behind."""
+    """torch.load believes the number in the file, and reads the memory behind it."""
 
     class Pickler(pickle.Pickler):
         def persistent_id(self, value: Any) -> Any:

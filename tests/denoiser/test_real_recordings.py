@@ -44,7 +44,7 @@ def test_the_mean_rate_is_kept_but_for_the_dark_current(streams):
 
 
 def test_grain_is_less(streams):
-    """Contrast between neighbouring pixels, over what neighbours two apart already differ by."""
+    """Contrast between neighbouring pixels, over the difference of neighbours two apart."""
     noisy, denoised = (middleTFP(s, 80, 81) for s in streams)
     grain = [float(np.abs(np.diff(p, 2, axis=1)).mean()) for p in (noisy, denoised)]
     print(f"mean second difference {grain[0]:.4f} -> {grain[1]:.4f}")

@@ -1,4 +1,4 @@
-"""Pictures by name: what they are of a constant light, how windows end, and what is refused."""
+"""Pictures by name: of a constant light, at the stream's ends, and the errors of unusable input."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A whole stream through a denoiser gives what `denoise` does."""
+"""A whole stream through a denoiser has the bits of `denoise`."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Training along streams: what counts, what is carried on, and what the loss weighs."""
+"""Training along streams: passes that count, carried arrays, and weights of the loss."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ class Flats:
 
 
 class Answers(nn.Module):
-    """Always the same rates; what it carries on is the number of the pass.  `carried`: what came to each."""
+    """Always the same rates; it carries on the number of the pass.  `carried`: input of each."""
 
     def __init__(self, rates):
         super().__init__()
@@ -133,7 +133,7 @@ def test_a_teacher_is_wanted_instead_of_the_light_and_carries_on_its_own(monkeyp
 
 
 def test_gradients_reach_back_through_the_passes(flats):
-    """The second pass that counts depends on what the first one carried on."""
+    """The second pass that counts depends on the arrays that the first one carried on."""
 
     class Carrying(nn.Module):
         def __init__(self):

@@ -1,4 +1,4 @@
-"""The input of a pass as one array: what it holds, and that a pass over it gives the bits of the call of training."""
+"""The input of a pass as one array: a pass over it gives the bits of the call of training."""
 
 from __future__ import annotations
 
@@ -10,30 +10,10 @@ from denoiser import infer
 from denoiser.pixel_map import PixelMap
 from denoiser.recipe import RECIPES
 from denoiser.side_by_side import side_by_side
-from denoiser.strips import ROWS
-from denoiser.window import PassWindow, RollingWindow
+from denoiser.window import RollingWindow
 from spikecam_env.threads import as_many_as_pay
 
 BEST = RECIPES["best"]
-
-
-def window(span: int, layers: int, shape: tuple[int, int], seed: int = 0) -> PassWindow:
-    rng = np.random.default_rng(seed)
-    spikes = (rng.random((span, *shape)) < 0.3).astype(np.uint8)
-    return PassWindow(0, 1, spikes, rng.normal(size=(layers, *shape)).astype(np.float32))
-
-
-@pytest.mark.parametrize("number_type", [torch.bfloat16, torch.float32])
-@pytest.mark.parametrize("span", [48, 13])
-def test_channels_are_spikes_planes_and_last_rate_and_the_border_is_repeated(number_type, span):
-    shape = (ROWS + 3, 9)
-    windows = [window(span, 5, shape), window(span, 5, shape, seed=1)]
-    last = np.random.default_rng(2).random((1, *shape)).astype(np.float32)
-    found = side_by_side(windows, [last, None], number_type, 4)
-    assert found.shape == (2, span + 6, ROWS + 4, 12) and found.stride(1) == 1
-    for one, w, rate in zip(found, windows, (last, np.zeros_like(last)), strict=True):
-        wanted = np.pad(np.concatenate([w.spikes.astype(np.float32), w.planes, rate]), ((0, 0), (0, 1), (0, 3)), "edge")
-        assert torch.equal(one, torch.from_numpy(wanted).to(number_type))
 
 
 @pytest.mark.parametrize("number_type", [torch.bfloat16, torch.float32])

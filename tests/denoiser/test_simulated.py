@@ -174,7 +174,7 @@ MIXTURE = {
     "texels a pixel": (lambda s: s["zoom"].mean(), 0.95, 1.4),
     "contrast": (lambda s: (s["levels"].amax((1, 2)) / s["levels"].amin((1, 2))).median(), 6.9, 1.3),
 }
-"""What is measured in many scenes, about how much it is, within which factor: twice a constant is another mixture."""
+"""A measure of many scenes, its value, and a factor that it keeps to: twice a constant is another mixture."""
 
 
 def at_rest(scene):
@@ -182,11 +182,11 @@ def at_rest(scene):
     return (motion(scene)[0][~still(scene)] == 0).float()
 
 
-@pytest.mark.parametrize("what", MIXTURE)
-def test_the_mixture_of_scenes(scenes, what):
-    measured, about, within = MIXTURE[what]
+@pytest.mark.parametrize("name", MIXTURE)
+def test_the_mixture_of_scenes(scenes, name):
+    measured, about, within = MIXTURE[name]
     found = float(measured(scenes))
-    print(f"{what}: {found:.4f}")
+    print(f"{name}: {found:.4f}")
     assert about / within < found < about * within
 
 

@@ -1,11 +1,10 @@
-"""The tables: rows that are there, rows that are not, going on after a stop, and the figures beside the wanted ones."""
+"""The tables: rows with and without weights, and a table that goes on after a stop."""
 
 from __future__ import annotations
 
 import json
 from dataclasses import replace
 from pathlib import Path
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -13,11 +12,10 @@ import torch
 
 from denoiser.evaluate import exposed, still, tables, work
 from denoiser.evaluate.exposed import StreamCase
-from denoiser.evaluate.figures import figures
-from denoiser.evaluate.judge import PictureScore, RowResult
+from denoiser.evaluate.judge import RowResult
 from denoiser.evaluate.rows import ROWS, Weights, why_not
 from denoiser.evaluate.table_report import report
-from denoiser.evaluate.table_summary import groups, mean_and_spread
+from denoiser.evaluate.table_summary import mean_and_spread
 from denoiser.evaluate.tables import TABLES, TableRequest, evaluate_table
 from denoiser.pixel_map import PixelMap
 from spikecam_env.datasets import build, phm_n
@@ -56,14 +54,15 @@ def test_the_multi_stage_update_of_the_true_light_is_worse_than_its_accumulation
         assert by_mus < summed
 
 
-def test_rows_without_weights_are_named_with_the_reason(tmp_path: Path) -> None:
-    """Of earlier weights none are shipped."""
-    found = evaluate_table("table3", replace(SMALL, seeds=1, rows=("before", "clean"), out=tmp_path / "out"))
+def test_rows_without_weights_are_named_with_the_reason(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    path = Weights.path
+    with monkeypatch.context() as patch:
+        patch.setattr(Weights, "path", lambda self, name: tmp_path / "fast.pt" if name == "fast" else path(self, name))
+        found = evaluate_table("table3", replace(SMALL, seeds=1, rows=("fast", "clean"), out=tmp_path / "out"))
     text = report(found)
-    assert "before.pt" in found["missing"]["before"]
-    assert "before: no weights are shipped under this name: before.pt" in text
-    line = next(line for line in text.splitlines() if line.startswith("best, earlier weights"))
-    assert set(line.removeprefix("best, earlier weights")) <= set(" -|")
+    assert "fast: no weights are shipped under this name: fast.pt" in text
+    line = next(line for line in text.splitlines() if line.startswith("fast "))
+    assert set(line.removeprefix("fast")) <= set(" -|")
     with pytest.raises(InputError, match=r"there is no file .*none\.pt"):
         evaluate_table(
             "table3", replace(SMALL, weights=Weights({"paper-no-refine": tmp_path / "none.pt"}), rows=("baseline",))
@@ -110,36 +109,38 @@ class Counted:
 DO = work.do
 
 
-def run(monkeypatch: pytest.MonkeyPatch, asked: TableRequest, fail_at: int | None = None) -> list[tuple[str, int, str]]:
+def run(
+    monkeypatch: pytest.MonkeyPatch, request: TableRequest, fail_at: int | None = None
+) -> list[tuple[str, int, str]]:
     """The tasks that were done for a table."""
     counted = Counted(fail_at)
     monkeypatch.setattr(work, "do", counted)
     if fail_at is None:
-        evaluate_table("table1", asked)
+        evaluate_table("table1", request)
     else:
         with pytest.raises(KeyboardInterrupt):
-            evaluate_table("table1", asked)
+            evaluate_table("table1", request)
     return counted.tasks
 
 
 def test_a_table_that_was_stopped_goes_on_where_it_was(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, result: dict
 ) -> None:
-    asked = replace(SMALL, out=tmp_path / "out")
-    done = run(monkeypatch, asked, fail_at=3)
-    rest = run(monkeypatch, asked)
+    request = replace(SMALL, out=tmp_path / "out")
+    done = run(monkeypatch, request, fail_at=3)
+    rest = run(monkeypatch, request)
     assert len(done) == 3 and not set(done) & set(rest)
     assert {*done, *rest} == {("disk", seed, s) for seed in (0, 1) for s in ("noisy", "tfp41", "clean", "light")}
     assert json.loads((tmp_path / "out" / "table1.json").read_text())["scenes"] == result["scenes"]
-    assert run(monkeypatch, asked) == []
+    assert run(monkeypatch, request) == []
 
 
 def test_more_scenes_seeds_and_intervals_are_added_to_what_is_there(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    asked = replace(SMALL, seeds=1, rows=("noisy",), shape=(16, 24), out=tmp_path)
-    assert run(monkeypatch, asked) == [("disk", 0, "noisy")]
-    more = replace(asked, seeds=2, scenes=("disk", "collage"), rows=("noisy", "clean"))
+    request = replace(SMALL, seeds=1, rows=("noisy",), shape=(16, 24), out=tmp_path)
+    assert run(monkeypatch, request) == [("disk", 0, "noisy")]
+    more = replace(request, seeds=2, scenes=("disk", "collage"), rows=("noisy", "clean"))
     assert len(run(monkeypatch, more)) == 2 * 2 * 2 - 1
     assert len(run(monkeypatch, replace(more, intervals=(10.0, 20.0)))) == 2 * 2 * 2
 
@@ -147,24 +148,24 @@ def test_more_scenes_seeds_and_intervals_are_added_to_what_is_there(
 def test_other_weights_are_measured_again_and_other_settings_are_refused(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    asked = replace(SMALL, seeds=1, rows=("noisy", "paper"), shape=(16, 24), out=tmp_path)
-    assert len(run(monkeypatch, asked)) == 2
+    request = replace(SMALL, seeds=1, rows=("noisy", "paper"), shape=(16, 24), out=tmp_path)
+    assert len(run(monkeypatch, request)) == 2
     copy = tmp_path / "paper.pt"
     copy.write_bytes(Weights().path("paper").read_bytes())
-    same = replace(asked, weights=Weights({"paper": copy}))
+    same = replace(request, weights=Weights({"paper": copy}))
     assert run(monkeypatch, same) == []
     digest = Weights.digest
     monkeypatch.setattr(Weights, "digest", lambda self, name: "other" if name == "paper" else digest(self, name))
     assert run(monkeypatch, same) == [("disk", 0, "paper")]
-    for other in (replace(asked, shape=(16, 32)), replace(asked, frames=210)):
+    for other in (replace(request, shape=(16, 32)), replace(request, frames=210)):
         with pytest.raises(InputError, match="other settings"):
             evaluate_table("table1", other)
 
 
 def test_two_processes_find_what_one_does(result: dict) -> None:
-    asked = replace(SMALL, rows=("noisy",), jobs=2)
-    rows = [r for r in result["scenes"] if r["row"] in asked.rows]
-    assert evaluate_table("table1", asked)["scenes"] == rows
+    request = replace(SMALL, rows=("noisy",), jobs=2)
+    rows = [r for r in result["scenes"] if r["row"] in request.rows]
+    assert evaluate_table("table1", request)["scenes"] == rows
 
 
 def test_rate_planes_are_judged_beside_spikes() -> None:
@@ -181,13 +182,14 @@ def test_learned_reconstructions_are_columns_and_pipelines(tmp_path: Path, monke
     """TFP 41 stands in for them: their columns and rows are then its own."""
     for name in ("ssml", "spk2img-clean", "spk2img-noisy"):
         torch.save({"state_dict": {"weight": torch.zeros(3, 4)}}, tmp_path / f"{name}.pt")
-    stand_in = SimpleNamespace(
-        reconstruct=lambda name, spikes, t, weights: middleTFP(spikes, t, 41),
-        reconstruct_many=lambda name, spikes, frames, weights: np.stack([middleTFP(spikes, t, 41) for t in frames]),
-    )
-    monkeypatch.setattr(exposed, "_reconstruction", lambda: stand_in)
-    asked = replace(SMALL, seeds=1, rows=("noisy", "tfp", "ssml", "spk2img-noisy"))
-    found = evaluate_table("table1", replace(asked, weights=Weights.found(tmp_path, {})))
+
+    def films(name, spikes, frames, weights):
+        return np.stack([middleTFP(spikes, t, 41) for t in frames])
+
+    monkeypatch.setattr(exposed, "reconstruct", lambda name, spikes, t, weights: middleTFP(spikes, t, 41))
+    monkeypatch.setattr(exposed, "reconstruct_many", films)
+    request = replace(SMALL, seeds=1, rows=("noisy", "tfp", "ssml", "spk2img-noisy"))
+    found = evaluate_table("table1", replace(request, weights=Weights.found(tmp_path, {})))
     rows = found["groups"][0]["rows"]
     assert found["parameters"] == {"noisy": None, "tfp": None, "ssml": 12, "spk2img-noisy": 12}
     assert "SSML, then spikes, 0.00 M" in report(found)
@@ -202,12 +204,12 @@ def test_streams_come_from_a_dataset_too(tmp_path: Path) -> None:
     """Seed 0 is the dataset's camera: the same streams, so the same figures."""
     plan = phm_n(scenes=("disk",), shape=(32, 48), frames=264)
     build(plan, tmp_path / "data")
-    asked = replace(SMALL, seeds=1, frames=264, rows=("noisy", "clean"))
-    simulated = evaluate_table("table1", asked)
-    assert evaluate_table("table1", replace(asked, data=tmp_path / "data"))["groups"] == simulated["groups"]
+    request = replace(SMALL, seeds=1, frames=264, rows=("noisy", "clean"))
+    simulated = evaluate_table("table1", request)
+    assert evaluate_table("table1", replace(request, data=tmp_path / "data"))["groups"] == simulated["groups"]
     (tmp_path / "data" / "test" / "disk.h5").unlink()
     with pytest.raises(InputError, match=r"disk\.h5"):
-        evaluate_table("table1", replace(asked, data=tmp_path / "data"))
+        evaluate_table("table1", replace(request, data=tmp_path / "data"))
 
 
 def test_real_recordings_are_judged_by_niqe_or_named_as_absent(tmp_path: Path) -> None:
@@ -233,14 +235,14 @@ def test_at_rest_the_mean_of_clean_frames_is_the_light_and_that_of_noisy_ones_ha
 
 
 def test_unknown_names_and_short_streams_are_refused() -> None:
-    for asked, why in (
+    for request, why in (
         (replace(SMALL, scenes=("disks",)), "disk"),
         (replace(SMALL, rows=("bests",)), "best"),
         (replace(SMALL, frames=150), "200"),
         (replace(SMALL, seeds=0), "seeds"),
     ):
         with pytest.raises(InputError, match=why):
-            evaluate_table("table1", asked)
+            evaluate_table("table1", request)
     with pytest.raises(InputError, match="table1"):
         evaluate_table("table9")
 
@@ -258,51 +260,6 @@ def test_the_spread_is_over_seeds_of_the_mean_over_scenes() -> None:
     )
     assert mean_and_spread([(0, 1.0)]) == (1.0, None)
     assert mean_and_spread([(0, None)]) == (None, None)
-
-
-def record(row: str, scene: str, db: dict[str, float], niqe: float | None = None, **measures: float) -> RowResult:
-    pictures = {column: PictureScore(db=level, ssim=0.5) for column, level in db.items()}
-    pictures |= {} if niqe is None else {"tfi": PictureScore(niqe=niqe)}
-    return RowResult(
-        scene=scene, seed=0, interval=10.0, speed=0.0, row=row, weights={}, pictures=pictures, **measures
-    )  # fmt: skip
-
-
-def test_the_figures_name_what_holds_and_what_does_not() -> None:
-    noisy, best, clean = {"spk2img-clean": 20.0, "tfp21": 20.0}, {"spk2img-clean": 21.0, "tfp21": 21.8}, {"tfp21": 22.0}
-    worse = best | {"spk2img-clean": 19.9}
-    records = [
-        *(record(row, "a", db) for row, db in (("noisy", noisy), ("clean", clean))),
-        record("best", "a", best, bias=-0.02, flicker=1.05, texture=0.8),
-        *(record(row, "b", db) for row, db in (("noisy", noisy), ("clean", clean), ("best", worse))),
-    ]
-    found = {f["what"]: f for f in figures("table1", groups(records), records)}
-    mean = found["best, Spk2Img, clean: mean over noisy [dB]"]
-    assert (mean["found"], mean["holds"]) == (0.45, False)
-    least = found["best, Spk2Img, clean: least over noisy of any scene [dB]"]
-    assert (least["found"], least["holds"]) == (-0.1, False)
-    gap = found["best, TFP 21: share of the gap closed"]
-    assert (gap["found"], gap["holds"]) == (0.9, True)
-    assert found["best: bias"]["holds"] is False
-    assert found["best: frame-to-frame error across passes / within"]["holds"] is True
-    assert found["best: slope of low-contrast texture"]["holds"] is True
-    assert found["best, rate planes: mean [dB]"]["holds"] is None
-    dim = [r.model_copy(update={"interval": 40.0}) for r in records]
-    assert all("over noisy (" in f["what"] or "worst" in f["what"] for f in figures("table1", groups(dim), dim))
-
-
-def test_naturalness_counts_downwards() -> None:
-    records = [
-        record(row, "a", {}, niqe=niqe) for row, niqe in (("noisy", 5.0), ("paper-held", 4.6), ("paper-mus", 4.5))
-    ]
-    found = {f["what"]: f for f in figures("table2", groups(records), records)}
-    assert (found["TFI: paper-mus over noisy [NIQE]"]["found"], found["TFI: paper-mus over noisy [NIQE]"]["holds"]) == (
-        -0.5,
-        True,
-    )
-    ablation = {f["what"]: f for f in figures("table4", groups(records), records)}
-    assert ablation["TFI: MUS over intervals kept, paper [NIQE]"]["found"] == -0.1
-    assert ablation["TFI: refine over none, mus [NIQE]"]["holds"] is None
 
 
 def test_the_calibration_of_a_still_scene_is_of_the_camera_before_it() -> None:

@@ -1,4 +1,4 @@
-"""Training: seeded, resumable, and it writes what it says."""
+"""Training: seeded, resumable, with a record in the file."""
 
 from __future__ import annotations
 
@@ -51,9 +51,9 @@ def test_a_resumed_run_goes_on(small, tmp_path, monkeypatch):
     monkeypatch.setattr(training, "source", lambda *a, seed, **o: seeds.append(seed) or drawn(*a, seed=seed, **o))
     monkeypatch.setattr(training_loop, "share_done", lambda limits, run: 1.0 if run.step == 2 else done(limits, run))
     half = weights_after(tmp_path, 4)
-    begun = Run.begin(RECIPES["best"].network())
-    begun.load(tmp_path / "last.pt")
-    assert same(begun.network.state_dict(), half)
+    resumed = Run.begin(RECIPES["best"].network())
+    resumed.load(tmp_path / "last.pt")
+    assert same(resumed.network.state_dict(), half)
     monkeypatch.setattr(training_loop, "share_done", done)
     whole = weights_after(tmp_path, 4)
     record = load_weights(tmp_path / "best.pt")[2]
@@ -137,13 +137,13 @@ def test_a_smaller_network_begins_from_what_a_larger_one_has_learnt(small, tmp_p
     """Half the channels of `best` begin 5 dB better than untrained ones; without its refine module `paper` goes on."""
     monkeypatch.setattr(training, "NARROWING_PASSES", 6)
     options = {"lr": 1e-9, "validate_every": 1, "validate_passes": 4, "channels": (32, 64, 12)}
-    for name, start in (("begun", "best"), ("untrained", None)):
+    for name, start in (("from_best", "best"), ("untrained", None)):
         weights_after(tmp_path / name, 1, start=start, **options)
-    begun, untrained = (
-        json.loads((tmp_path / name / "curve.json").read_text())[0]["network_db"] for name in ("begun", "untrained")
+    from_best, untrained = (
+        json.loads((tmp_path / name / "curve.json").read_text())[0]["network_db"] for name in ("from_best", "untrained")
     )
-    print(f"{begun} dB, untrained {untrained} dB")
-    assert begun > untrained + 5
+    print(f"{from_best} dB, untrained {untrained} dB")
+    assert from_best > untrained + 5
     weights = weights_after(tmp_path / "bare", 1, "paper", refine=False, start="paper", lr=1e-9)
     shipped = load_weights(pretrained_path("paper"))[1].state_dict()
     assert torch.allclose(weights["stem.0.0.weight"], shipped["stem.0.0.weight"], atol=1e-6)
@@ -195,7 +195,7 @@ def test_the_rate_of_learning_warms_up_and_falls_to_nothing():
         ),
         (
             {"channels": (32, 64, 12), "compiled": True},
-            "spikecam train --mode best --out OUT --channels 32 64 12 --compiled",
+            "spikecam train --mode best --out OUT --compiled --channels 32 64 12",
         ),
     ],
 )
@@ -216,15 +216,6 @@ def test_the_run_of_another_mode_is_refused(small, tmp_path):
     weights_after(tmp_path, 1, "paper")
     with pytest.raises(InputError, match=r"last\.pt"):
         weights_after(tmp_path, 2, "best")
-
-
-@pytest.mark.parametrize(
-    "bad",
-    [{"steps": 0}, {"patch": 97}, {"lr": 0.0}, {"batch": 0}, {"device": "tpu"}, {"device": "cuda:x"}],
-)
-def test_unusable_options_are_named(bad):
-    with pytest.raises(InputError, match=next(iter(bad))):
-        TrainConfig(**bad)
 
 
 @pytest.mark.parametrize("kind", [TrainConfig, ReconstructorConfig])
@@ -249,36 +240,33 @@ def test_a_network_learns_on_a_gpu(small, tmp_path):
     assert all(w.device.type == "cpu" and bool(torch.isfinite(w).all()) for w in weights.values())
 
 
-@pytest.mark.parametrize("name", ["steps", "batch", "seed", "threads", "patch", "validate_every", "validate_passes"])
-@pytest.mark.parametrize("value", [-1, 10**30, 1.5, float("nan"), None, True, "8"])
-def test_a_count_out_of_range_is_named(name, value):
-    with pytest.raises(InputError, match=name):
-        TrainConfig(**{name: value})
+COUNTS = {
+    TrainConfig: ("steps", "batch", "seed", "threads", "patch", "validate_every", "validate_passes"),
+    ReconstructorConfig: ("steps", "batch", "seed", "threads", "patch", "validate_every", "frames_a_step"),
+}
+BAD = [
+    *({"steps": 0}, {"batch": 0}, {"mode": None}, {"mode": "worst"}, {"out": 3}, {"out": None}),
+    *({"resume": "no"}, {"resume": None}, {"device": 0}, {"device": "tpu"}, {"device": "cuda:x"}),
+]
+OWN = {
+    TrainConfig: [{"patch": 97}, {"channels": (8, 8)}, {"channels": (8, 8, 0)}, {"channels": "8 8 8"}],
+    ReconstructorConfig: [{"mode": "best"}, {"patch": 193}, {"width": 13}, {"width": 0}],
+}
 
 
-@pytest.mark.parametrize("name", ["lr", "minutes", "save_every_s"])
-@pytest.mark.parametrize("value", [0.0, -1.0, float("nan"), float("inf"), 1e308, True, "0.1"])
-def test_an_amount_out_of_range_is_named(name, value):
-    with pytest.raises(InputError, match=name):
-        TrainConfig(**{name: value})
-
-
-@pytest.mark.parametrize(
-    "bad",
-    [
-        {"mode": None},
-        {"mode": "worst"},
-        {"out": 3},
-        {"resume": "no"},
-        {"device": 0},
-        {"channels": (8, 8)},
-        {"channels": (8, 8, 0)},
-        {"channels": "8 8 8"},
-    ],
-)
-def test_other_options_are_checked(bad):
-    with pytest.raises(InputError, match=next(iter(bad))):
-        TrainConfig(**bad)
+@pytest.mark.parametrize("kind", COUNTS)
+def test_unusable_options_are_named_in_one_line(kind):
+    counts = [{name: n} for name in COUNTS[kind] for n in (-1, 10**30, 1.5, float("nan"), None, True, "8")]
+    amounts = [
+        {name: amount}
+        for name in ("lr", "minutes", "save_every_s")
+        for amount in (0.0, -1.0, float("nan"), float("inf"), 1e308, True, "0.1")
+    ]
+    for bad in (*counts, *amounts, *BAD, *OWN[kind]):
+        name = {"mode": "denoiser mode|learned reconstructor"}.get(next(iter(bad)), next(iter(bad)))
+        with pytest.raises(InputError, match=name) as caught:
+            kind(**bad)
+        assert "\n" not in str(caught.value), bad
 
 
 ODD_RUNS = {
@@ -306,7 +294,7 @@ ODD_RUNS = {
 
 
 @pytest.fixture(scope="module")
-def begun(tmp_path_factory, bank):
+def run_of_one_step(tmp_path_factory, bank):
     """A run of one step."""
     out = tmp_path_factory.mktemp("run")
     with pytest.MonkeyPatch.context() as patch:
@@ -316,8 +304,8 @@ def begun(tmp_path_factory, bank):
 
 
 @pytest.mark.parametrize("name", ODD_RUNS)
-def test_an_odd_run_to_resume_is_refused_in_one_line(begun, tmp_path, name):
-    run = torch.load(begun, weights_only=True)
+def test_an_odd_run_to_resume_is_refused_in_one_line(run_of_one_step, tmp_path, name):
+    run = torch.load(run_of_one_step, weights_only=True)
     changed = ODD_RUNS[name](run)
     torch.save(changed if isinstance(changed, list) else run, tmp_path / "last.pt")
     with pytest.raises(InputError, match=r"last\.pt") as caught:

@@ -1,4 +1,4 @@
-"""The truth tests together, small: what is there without recordings, and with them."""
+"""The truth tests together, small, without recordings and with them."""
 
 from __future__ import annotations
 

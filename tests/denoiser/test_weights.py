@@ -1,4 +1,4 @@
-"""Checkpoints: they come back as they were, and anything else is refused in one line."""
+"""Checkpoints come back as they were; shipped ones are small and have a record (others: `test_plain_torch`)."""
 
 from __future__ import annotations
 
@@ -25,9 +25,9 @@ def checkpoint(tmp_path):
 
 def test_a_checkpoint_comes_back_as_it_was(checkpoint):
     torch.manual_seed(0)
-    there = OnlineDnSS(RECIPES["best"], RECIPES["best"].network(), output="rate")
+    original = OnlineDnSS(RECIPES["best"], RECIPES["best"].network(), output="rate")
     back = OnlineDnSS.from_file(checkpoint, output="rate")
-    assert np.array_equal(there.push(SPIKES), back.push(SPIKES))
+    assert np.array_equal(original.push(SPIKES), back.push(SPIKES))
     assert load_weights(checkpoint)[0] == RECIPES["best"]
     assert not list(checkpoint.parent.glob("*.part"))
 
@@ -49,36 +49,6 @@ def test_shipped_weights_are_small_together():
     )
     assert {f"{name}.pt" for name in (*RECIPES, "paper-no-refine", *LEARNED)} == set(sizes)
     assert sum(sizes.values()) < 12e6
-
-
-def test_a_truncated_file_is_refused(checkpoint):
-    checkpoint.write_bytes(checkpoint.read_bytes()[:5000])
-    with pytest.raises(InputError, match=r"best\.pt"):
-        load_weights(checkpoint)
-
-
-@pytest.mark.parametrize("content", [b"", b"not weights at all", b"\x80\x04N."])
-def test_a_foreign_file_is_refused(tmp_path, content):
-    path = tmp_path / "foreign.pt"
-    path.write_bytes(content)
-    with pytest.raises(InputError, match=r"foreign\.pt"):
-        load_weights(path)
-
-
-@pytest.mark.parametrize("data", [[1, 2], {"state_dict": {}}, {"format": "spikecam-denoiser/1", "recipe": {}}])
-def test_a_torch_file_of_something_else_is_refused(tmp_path, data):
-    path = tmp_path / "other.pt"
-    torch.save(data, path)
-    with pytest.raises(InputError):
-        load_weights(path)
-
-
-def test_weights_of_another_network_are_refused(checkpoint):
-    data = torch.load(checkpoint, weights_only=True)
-    data["state_dict"] = RECIPES["paper"].network().state_dict()
-    torch.save(data, checkpoint)
-    with pytest.raises(InputError, match="another network"):
-        load_weights(checkpoint)
 
 
 def test_a_missing_file_is_named(tmp_path):

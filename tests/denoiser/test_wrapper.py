@@ -99,10 +99,10 @@ def test_one_denoiser_given_to_two_environments_gives_each_its_own_stream():
 def test_a_denoiser_that_is_given_stays_as_it_was():
     mine, twin = denoiser("rate"), denoiser("rate")
     stream = (np.random.default_rng(0).random((60, *SHAPE)) < 0.3).astype(np.uint8)
-    begun = [mine.push(stream[:30]), twin.push(stream[:30])]
+    pushed = [mine.push(stream[:30]), twin.push(stream[:30])]
     env = DenoiseObservation(Noise(), mine, "spikes")
     episode(env)
-    assert mine.output == "rate" and np.array_equal(*begun)
+    assert mine.output == "rate" and np.array_equal(*pushed)
     assert np.array_equal(mine.push(stream[30:]), twin.push(stream[30:]))
 
 

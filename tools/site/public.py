@@ -42,6 +42,7 @@ MODULES = (
     "scenes.trajectories",
     "scenes.textures",
     "denoiser",
+    "denoiser.dataset",
 )
 """Each stands on one page of docs/reference/api."""
 
