@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from spikecam_env.gap.candidates.strength import bounded
 from spikecam_env.gap.candidates.table import candidate
 from spikecam_env.gap.compare.distance import in_noise, loss
-from spikecam_env.gap.compare.prediction import Null, pair_noise_share, pooled
+from spikecam_env.gap.compare.prediction import TOLERANCE, Null, pair_noise_share, pooled
 from spikecam_env.gap.compare.step import scale_of
 from spikecam_env.gap.observe.conditions import Condition
 from spikecam_env.gap.screen.templates import Template, Templates
@@ -26,21 +26,17 @@ from spikecam_env.types import Floats
 
 @dataclass(frozen=True, eq=False)
 class Screened:
-    """A candidate by its template.
-
-    Args:
-        name: of the candidate.
-        start: parameters to fit from.
-        misfit: that it would leave.
-        expected: (S,) change of the statistics at the start.
-        white: s^2 of the unit at the start, over the refit's.
-    """
+    """A candidate by its template."""
 
     name: str
     start: dict[str, float]
+    """Parameters to fit from."""
     misfit: float
+    """That it would leave."""
     expected: Floats
+    """(S,) change of the statistics at the start."""
     white: float = 1.0
+    """s^2 of the unit at the start, over the refit's."""
 
 
 def screen(
@@ -56,7 +52,7 @@ def screen(
     Args:
         templates: the bank.
         conditions: of the recordings.
-        null: what the model predicts without a candidate.
+        null: prediction of the model without a candidate.
         measured: (S,) statistics, NaN where they take no part.
         names: of the candidates.
         line_hz: frequency [Hz] of the strongest line of the measured spectra, from which periodic candidates start.
@@ -90,12 +86,11 @@ def screen(
 def _in_proportion(entry: Template, null: Null, d: Floats, shift: Floats) -> Screened | None:
     """A template scaled to the measured distances `d`, in noise; None where only a wrong sign would do."""
     own2 = pair_noise_share(null.keys) ** 2 * (shift != 0)
-    judging = replace(null.settings.judging, tolerance=2 * null.settings.judging.tolerance)
-    scale, _ = scale_of(d, shift, np.ones_like(d), own2, judging)
+    scale, _ = scale_of(d, shift, np.ones_like(d), own2, 2 * TOLERANCE)
     if scale <= 0 and not candidate(entry.name).may_be_negative:
         return None
     strength, power = CATALOGUE[entry.name].strength, candidate(entry.name).power
-    rho = (d - scale * shift) / np.sqrt(1.0 + scale**2 * own2 + (judging.tolerance * scale * shift) ** 2)
+    rho = (d - scale * shift) / np.sqrt(1.0 + scale**2 * own2 + (2 * TOLERANCE * scale * shift) ** 2)
     there = entry.parameters[strength] * np.sign(scale) * abs(scale) ** (1 / power)
     start = bounded(entry.name, {**entry.parameters, strength: there})
     white = 1.0 / (1.0 + abs(scale) * (1.0 / entry.white - 1.0))

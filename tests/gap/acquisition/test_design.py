@@ -64,7 +64,7 @@ def test_light_is_stored_small(campaign) -> None:
 
 
 def test_recordings_share_the_unit_and_nothing_else(campaign) -> None:
-    """Pixel-to-pixel rates of two takes agree; what is left is read-out, not pattern.  Their spikes do not."""
+    """Pixel-to-pixel rates of two takes agree; the rest is read-out, not pattern.  Their spikes do not."""
     one, two = (r.load()[:300] for r in campaign.recordings[1:3])
     rates = [s.mean(axis=0).ravel() for s in (one, two)]
     correlation = np.corrcoef(*rates)[0, 1]
@@ -162,7 +162,7 @@ def test_a_folder_of_something_else_is_left_alone(finished: bool, tmp_path: Path
         ({"engine": "slow"}, "unknown engine 'slow'"),
     ],
 )
-def test_what_cannot_be_recorded_is_refused_before_a_recording(changed, message: str, tmp_path: Path) -> None:
+def test_an_impossible_design_is_refused_before_a_recording(changed, message: str, tmp_path: Path) -> None:
     settings = {"model": MODEL, "shape": (8, 8), "frames": 50, "recordings": (Dark(),)} | changed
     with pytest.raises(InputError, match=message):
         write_campaign(tmp_path / "bad", **settings)

@@ -29,11 +29,11 @@ def test_drift_reveal(shown_by, where, names, silent):
 
 
 def at(times):
-    """What is seen of pixels that all fire at these times, each some frames later than the one before it."""
+    """A recording of pixels that all fire at these times, each some frames later than the one before it."""
     spikes = np.zeros((FRAMES, SHAPE[0] * SHAPE[1]), np.uint8)
     for pixel in range(spikes.shape[1]):
-        there = np.round(times + pixel % 40).astype(int)
-        spikes[there[there < FRAMES], pixel] = 1
+        fired = np.round(times + pixel % 40).astype(int)
+        spikes[fired[fired < FRAMES], pixel] = 1
     return observe(pack_frames(spikes.reshape(FRAMES, *SHAPE)), SHAPE)
 
 
@@ -59,7 +59,7 @@ def test_few_intervals_tell_nothing():
     assert lateness(at(np.array([10.0, 3000.0]))) == {}
 
 
-def test_what_all_pixels_do_is_no_variance_within_a_pixel():
+def test_a_change_of_all_pixels_is_no_variance_within_a_pixel():
     drifting = seen(recorded(effect("lamp_drift", sigma_per_root_s=0.3)))
     for flat in ("flat-0.2", "flat-0.65"):
         trend, pixels = (drifting[StatisticKey("drift", flat, name)] for name in ("trend", "pixels"))
