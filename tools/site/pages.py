@@ -22,7 +22,7 @@ from importlib import import_module
 from pathlib import Path, PurePosixPath
 
 from tools.site import benchmarks, commands, settings, tasks
-from tools.site.docstrings import rendered
+from tools.site.docstrings import as_restructured
 from tools.site.films import as_directives
 from tools.site.public import docstring_of, home_of, kind_of, names_of
 from tools.site.sections import section
@@ -83,7 +83,16 @@ def _moved(found: re.Match[str], folder: Path) -> str:
 def _module(module: str) -> list[str]:
     """Sphinx's directives for a module and all that it offers, each with its docstring."""
     docstring = import_module(module).__doc__ or ""
-    lines = [f"## {module}", "", "```{eval-rst}", f".. py:module:: {module}", "", *rendered(docstring), "```", ""]
+    lines = [
+        f"## {module}",
+        "",
+        "```{eval-rst}",
+        f".. py:module:: {module}",
+        "",
+        *as_restructured(docstring),
+        "```",
+        "",
+    ]
     for name in names_of(module):
         value = getattr(import_module(module), name)
         kind = kind_of(value)
@@ -96,7 +105,7 @@ def _module(module: str) -> list[str]:
                 "",
             ]
         elif kind == "data":
-            text = ["   " + line for line in rendered(docstring_of(module, name))]
+            text = ["   " + line for line in as_restructured(docstring_of(module, name))]
             lines += ["```{eval-rst}", f".. py:data:: {name}", f"   :module: {module}", "", *text, "```", ""]
         elif kind != "module":
             lines += ["```{eval-rst}", directive, *(["   :members:"] if kind == "class" else []), "```", ""]
