@@ -22,7 +22,7 @@ DIGITS = 12
 UNREADABLE = "unknown"
 """What is said where the package was installed without its sources."""
 
-DATA_SUFFIXES = (".npz", ".toml")
+DATA_SUFFIXES = (".npz", ".toml", ".jinja")
 """Endings of the data files that count."""
 
 

@@ -3,6 +3,9 @@
 from __future__ import annotations
 
 import math
+from typing import Any
+
+import numpy as np
 
 from spikecam_env.gap.report.words import bare, parameter_unit
 from spikecam_env.gap.result import Bound, Estimate, NamedEffect
@@ -104,3 +107,21 @@ def bounded_parameter(bound: Bound) -> str:
     """The parameter that a bound is of, with the effect's others where it shows least."""
     others = [f"{bare(bound.name, k)} {quantity(v, parameter_unit(bound.name, k))}" for k, v in bound.at.items()]
     return bare(bound.name, bound.parameter) + (f" ({', '.join(others)})" if others else "")
+
+
+def number(value: Any) -> str:
+    """Four digits; large ones whole, by thousands."""
+    if isinstance(value, (float, np.floating)):
+        known = float(value)
+        return f"{known:.4g}" if abs(known) < 1e4 else f"{known:,.0f}".replace(",", "\u202f")
+    return "–" if value is None else str(value)
+
+
+def signed(z: float) -> str:
+    """A deviate with its sign."""
+    return f"{z:+.1f}".replace("-", "−")
+
+
+def percent(share: float) -> str:
+    """A share in per cent."""
+    return f"{100 * share:.0f} %" if share >= 0.01 else f"{100 * share:.1g} %"

@@ -3,19 +3,19 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 
-from spikecam_env.gap.report.cells import percent
 from spikecam_env.gap.report.parameters_off import parameters_off
-from spikecam_env.gap.report.quantities import plain_sizes, rough, three_digits
+from spikecam_env.gap.report.quantities import percent, plain_sizes, rough, three_digits
 from spikecam_env.gap.report.words import human, listed
-from spikecam_env.gap.result import BOUNDED_VERDICTS, CHANCE, Conclusion, Gap, Remainder
+from spikecam_env.gap.result import BOUNDED_VERDICTS, CHANCE, Conclusion, Diagnosis, Gap, Remainder
 from spikecam_env.gap.twins.budget import Budget
 from spikecam_env.gap.verdict.notes import gap_is_fitted
 
 
 def sentence(found: Conclusion, model_name: str) -> str:
     """The verdict in one sentence; in two, where beside effects parameters are off."""
-    said = _SENTENCES[found.verdict](found, model_name)
+    said = VERDICTS_IN_WORDS[found.verdict][1](found, model_name)
     if found.verdict in ("named", "class") and found.parameters:
         said += f" Parameters of the model {model_name} are off as well: {all_off(found)}."
     return said
@@ -76,14 +76,20 @@ def data_sentence(found: Conclusion, model_name: str) -> str:
     return f"The recordings contradict their own labels: {said}."
 
 
-_SENTENCES = {
-    "none": none_sentence,
-    "named": named_sentence,
-    "class": class_sentence,
-    "unknown": unknown_sentence,
-    "parameter": parameter_sentence,
-    "data": data_sentence,
+VERDICTS_IN_WORDS: dict[str, tuple[str, Callable[[Conclusion, str], str]]] = {
+    "none": ("No gap found", none_sentence),
+    "named": ("Effect named", named_sentence),
+    "class": ("One of several effects", class_sentence),
+    "unknown": ("Effect unknown", unknown_sentence),
+    "parameter": ("A parameter is off", parameter_sentence),
+    "data": ("The data contradict themselves", data_sentence),
 }
+"""Of each verdict the heading, and the function that makes its sentence."""
+
+
+def heading(d: Diagnosis) -> str:
+    """The verdict above its sentence."""
+    return "Effect named, with a remainder" if d.remainder else VERDICTS_IN_WORDS[d.verdict][0]
 
 
 def all_off(found: Conclusion) -> str:
