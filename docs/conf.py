@@ -1,4 +1,4 @@
-"""The documentation as a site: `make docs`.  What is special to this repository is in tools/site."""
+"""The documentation as a site: `make docs`.  Additions of this repository are in tools/site."""
 
 import inspect
 import sys

@@ -1,7 +1,7 @@
 """The report of a diagnosis: one HTML file for an engineer who did not write it (`report.html.jinja`).
 
-From the answer to its reasons: the verdict in a sentence, its meaning, the gap before and after, the evidence,
-candidates, effects that could not be tested, the patched model, and how to make the page again.
+The verdict comes first, in a sentence, and its meaning.  Its reasons follow: gap, evidence, statistics and candidates.
+The patched model comes last, and how to make the page again.
 """
 
 from __future__ import annotations

@@ -1,11 +1,11 @@
-"""Evidence as curves: pure functions from observations to what the report draws.
+"""Evidence as curves: pure functions from observations to plots of the report.
 
 An exhibit is one way to look at recordings (rates, noise, spectrum ...), with a few panels: a measured curve, one twin
 of the model before and one after, and `sd`, the standard error of measured less before.  It comes from the scatter of
 that difference over pixels or columns, which the fixed pattern, the same on both sides, drops out of.
 
 Shares of intervals and coincidences have no such scatter, and regular spikes are far less random than independent
-ones: their sd is that of independent spikes, scaled by what two twins of one model differ by, where there are two.
+ones: their sd is that of independent spikes, scaled by the difference of two twins of one model, if there are two.
 """
 
 from __future__ import annotations
@@ -27,22 +27,23 @@ Array = NDArray[np.floating[Any]]
 
 @dataclass(frozen=True)
 class PlotPanel:
-    """One plot.  x, measured, before, sd (N,); after (N,) or None.  log: axes that are logarithmic, "", "x", "y", "xy".
-
-    xlabel, ylabel: with the unit in brackets, [1] of pure numbers.
-    labels: names of the points instead of numbers on the x axis, which then has no label.
-    """
+    """One plot: curves of N points."""
 
     title: str
     xlabel: str
+    """With the unit in brackets, [1] of pure numbers."""
     ylabel: str
+    """As `xlabel`."""
     x: Array
     measured: Array
     before: Array
     after: Array | None
     sd: Array
+    """Standard error of measured less before."""
     log: str = ""
+    """Axes that are logarithmic: "", "x", "y", "xy"."""
     labels: tuple[str, ...] = ()
+    """Names of the points instead of numbers on the x axis, which then has no label."""
 
     @property
     def z(self) -> float:
@@ -57,7 +58,7 @@ class PlotPanel:
 
 @dataclass(frozen=True)
 class PixelMaps:
-    """One picture (H, W) of every pixel, measured and simulated.  unit: of all of them."""
+    """One picture (H, W) of every pixel, measured and simulated, in one unit."""
 
     title: str
     unit: str
@@ -67,7 +68,7 @@ class PixelMaps:
 
 
 class ReportedRecording(NamedTuple):
-    """One recording: its conditions, and what was observed."""
+    """One recording: its conditions, and what it gave: measured, of twins before and after, of another twin before."""
 
     shown: Condition
     measured: ObservedRecording
@@ -110,13 +111,13 @@ def over_pixels(
 
 
 def mean_known(values: Array, known: NDArray[np.bool_]) -> Array:
-    """Mean over the last axis of what is known; 0 where nothing is."""
+    """Mean of known values over the last axis; 0 where none is known."""
     mean: Array = np.where(known, values, 0.0).sum(axis=-1) / np.maximum(known.sum(axis=-1), 1)
     return mean
 
 
 def error_known(values: Array, known: NDArray[np.bool_]) -> Array:
-    """Standard error of that mean."""
+    """Standard error of `mean_known`."""
     off = np.where(known, values - mean_known(values, known)[..., None], 0.0)
     count = np.maximum(known.sum(axis=-1), 1)
     error: Array = np.sqrt((off**2).sum(axis=-1)) / count
@@ -130,9 +131,9 @@ def largest(panels: Sequence[PlotPanel], number: int) -> list[PlotPanel]:
 
 
 def scaled_by_twins(sd: Array, difference: Array | None) -> Array:
-    """Standard errors times the root mean square of two twins' difference over them.
+    """Standard errors, scaled by the root mean square over them of two twins' difference.
 
-    Few points know that scale poorly: its upper 90 % limit is taken.
+    Few points determine that scale poorly: its upper 90 % limit is taken.
     """
     if difference is None:
         return sd

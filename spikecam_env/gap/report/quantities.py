@@ -12,12 +12,13 @@ from spikecam_env.gap.result import Bound, Estimate, NamedEffect
 
 
 def quantity(value: float, unit: str, sd: float | None = None) -> str:
-    """A value with its standard deviation and unit, to the digits that the latter leaves.
+    """A value with its standard deviation and unit, to the digits that the deviation leaves.
 
-    >>> quantity(0.0612, "relative", 0.0012)
-    '6.12 ± 0.12 %'
-    >>> quantity(1224.0, "us", 24.0)
-    '1.224 ± 0.024 ms'
+    Example:
+        >>> quantity(0.0612, "relative", 0.0012)
+        '6.12 ± 0.12 %'
+        >>> quantity(1224.0, "us", 24.0)
+        '1.224 ± 0.024 ms'
     """
     scale, unit = readable(value, unit)
     value *= scale
@@ -31,13 +32,13 @@ def quantity(value: float, unit: str, sd: float | None = None) -> str:
 
 
 def interval(estimate: Estimate, unit: str) -> str:
-    """Where a parameter is with 90 %, in the unit and to the digits of `quantity`, two of each end at least; a dash
-    where that is not known.
+    """The 90 % interval of a parameter, to the digits of `quantity`, at least two an end; a dash where none is known.
 
-    >>> interval(Estimate(0.3023, 0.0081, (0.2893, 0.3159)), "relative")
-    '28.93 … 31.59 %'
-    >>> interval(Estimate(7.2, 6.8, (1.52, 34.06)), "us")
-    '1.5 … 34.1 us'
+    Example:
+        >>> interval(Estimate(0.3023, 0.0081, (0.2893, 0.3159)), "relative")
+        '28.93 … 31.59 %'
+        >>> interval(Estimate(7.2, 6.8, (1.52, 34.06)), "us")
+        '1.5 … 34.1 us'
     """
     if estimate.interval is None:
         return "–"
@@ -60,8 +61,9 @@ def _digits(sd: float) -> int:
 def rough(value: float, unit: str) -> str:
     """A value to three digits, or whole, with its unit.
 
-    >>> rough(0.0218, "relative"), rough(31000.0, "electrons")
-    ('2.18 %', '31000 electrons')
+    Example:
+        >>> rough(0.0218, "relative"), rough(31000.0, "electrons")
+        ('2.18 %', '31000 electrons')
     """
     scale, unit = readable(value, unit)
     return f"{three_digits(value * scale)} {unit}".rstrip()
@@ -73,7 +75,7 @@ def three_digits(value: float) -> str:
 
 
 def readable(value: float, unit: str) -> tuple[float, str]:
-    """(factor, unit) that a value of a unit is stated in."""
+    """The unit that a value is stated in, and the factor to it: (factor, unit)."""
     if unit == "relative":
         return 100.0, "%"
     if unit == "us":
@@ -96,7 +98,7 @@ def plain_sizes(effect: NamedEffect) -> str:
 
 
 def at_most(bound: Bound) -> str:
-    """A bound to two digits, rounded up: no less can be stated."""
+    """A bound to two digits, rounded up: below it none is known."""
     scale, unit = readable(bound.below, bound.unit)
     value = bound.below * scale
     digit = 10.0 ** (math.floor(math.log10(value)) - 1) if value > 0 else 1.0

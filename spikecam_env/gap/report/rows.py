@@ -54,6 +54,15 @@ def off_rows(d: Diagnosis) -> Rows:
     ]  # fmt: skip
 
 
+REMAINDER = (
+    "The named effects explain nearly all of the difference in every group of statistics. The remainder is more than "
+    "chance, but small: the law of this camera differs in details from the catalogue's, or a much weaker effect hides "
+    "beside it. Parameters may be off by more than their errors; the patched model holds for light like that of these "
+    "recordings."
+)
+"""How to read a remainder."""
+
+
 def remainder_rows(left: Remainder) -> Rows:
     """The difference beside the named effects: its size, its statistics, its place."""
     return [
@@ -135,7 +144,7 @@ def bound_rows(d: Diagnosis) -> Rows:
 
 
 def needs(effects: Sequence[tuple[str, str]]) -> Rows:
-    """Effects, and what would show them."""
+    """Effects, and the recordings that would show them."""
     return [(human(name), needed) for name, needed in effects]
 
 

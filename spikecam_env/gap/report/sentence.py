@@ -1,4 +1,4 @@
-"""What is found, in a sentence for each verdict, and in lines beside it."""
+"""A verdict in a sentence, and the lines beside it."""
 
 from __future__ import annotations
 
@@ -53,7 +53,7 @@ def class_sentence(found: Conclusion, model_name: str) -> str:
 
 
 def unknown_sentence(found: Conclusion, model_name: str) -> str:
-    """A gap that no candidate closes; where a second effect was not looked for, no single one."""
+    """A gap that no candidate closes, or no single one where a second effect was not searched for."""
     patch = removed_phrase(found, "an empirical patch")
     about = found.unknown or {}
     if "not_looked_for" not in about:
@@ -99,7 +99,7 @@ def all_off(found: Conclusion) -> str:
 
 
 def removed_phrase(found: Conclusion, what: str) -> str:
-    """How much of the gap goes with what was added; empty where nothing does."""
+    """The share of the gap that an addition removes; empty where it removes none."""
     gap = found.gap
     if gap is None or not math.isfinite(gap.removed) or gap.removed <= 0:
         return ""
@@ -109,7 +109,7 @@ def removed_phrase(found: Conclusion, what: str) -> str:
 
 
 def gap_line(gap: Gap) -> str:
-    """What a model's patch did to the gap."""
+    """The gap before and after the patch of the model."""
     off = f"the mean square distance of statistics from the model, in noise, is {three_digits(gap.before)}"
     halves = "" if gap.floor == CHANCE else f", and two halves of the measurement differ by {gap.floor:.3g}"
     chance = f"{CHANCE:g} is chance{halves}"
@@ -136,7 +136,7 @@ NO_BOUNDS = (
     "Upper bounds of the effects that were not found are not simulated by default: `spikecam diagnose --bounds`, or "
     "diagnose(..., bounds=True), adds them. They take some 200 campaigns."
 )
-"""Why a diagnosis that found no effect has no bounds, and what adds them."""
+"""Why a diagnosis without effects has no bounds, and the option that adds them."""
 
 
 BOUNDS_OF_MAPS = "Recordings that are rates only have no upper bounds: these need spikes."
@@ -144,7 +144,7 @@ BOUNDS_OF_MAPS = "Recordings that are rates only have no upper bounds: these nee
 
 
 def unfinished(effort: Budget) -> list[str]:
-    """A note on what was not begun because enough had been simulated; none where nothing was left out."""
+    """A note on the parts that were left out to stay within the budget; none where nothing was."""
     left_out = listed([human(what) for what in effort.left_out], "and")
     wider = " Intervals are wider for it." if any("finer" in what for what in effort.left_out) else ""
     return [f"Skipped to stay within --effort: {left_out}. A larger --effort includes them.{wider}"] if left_out else []

@@ -35,7 +35,7 @@ def parameter_unit(effect: str, parameter: str) -> str:
 
 
 def meaning_of(effect: str, parameter: str) -> str:
-    """What a parameter is, in the catalogue's words."""
+    """The meaning of a parameter, in the catalogue's words."""
     for field in dataclasses.fields(CATALOGUE[effect]) if effect in CATALOGUE else ():
         if field.name == parameter:
             return str(field.metadata["doc"])
@@ -63,7 +63,7 @@ def described(effect: str) -> EffectInWords:
 
 
 def group_meaning(group: str) -> str:
-    """What a group of statistics looks at, as its file says; empty where the bank has none of this name."""
+    """The subject of a group of statistics, as its file says; empty where the bank has none of this name."""
     try:
         module = importlib.import_module(f"{statistics.__name__}.{group}")
     except ModuleNotFoundError:

@@ -1,4 +1,4 @@
-"""What is found, in a sentence."""
+"""The verdict in a sentence."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from spikecam_env.gap.verdict.notes import Note
 
 
 def sentence_of(d: Diagnosis) -> str:
-    """The sentence of what a diagnosis holds."""
+    """The sentence of a diagnosis."""
     held = vars(d) | {"notes": d.data}
     return sentence(Conclusion(**{f.name: held[f.name] for f in fields(Conclusion)}), d.model_name)
 

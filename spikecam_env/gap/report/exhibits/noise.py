@@ -43,7 +43,7 @@ def panels(evidence: Evidence, frame_rate_hz: float) -> Iterator[PlotPanel]:
 
 
 def _noise_by_step(static: Sequence[ReportedRecording]) -> PlotPanel | None:
-    """(A_k less what reading in frames adds) / 2 k T^2 over k, pooled over pixels and recordings."""
+    """(A_k less the noise of reading in frames) / 2 k T^2 over k, pooled over pixels and recordings."""
     fits = [_jitter([getattr(t, side) for t in static]) for side in ("measured", "before", "after")]
     measured, before, after = fits
     if measured is None or before is None or not np.array_equal(measured.steps, before.steps):

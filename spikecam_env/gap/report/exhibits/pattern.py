@@ -1,6 +1,6 @@
 """The fixed pattern: maps, histograms, and profiles by row and column, beside those of fresh units of the models.
 
-A twin has the measured unit's own pattern wherever its model has one, so that only a fresh unit shows what to expect.
+A twin has the measured unit's own pattern wherever its model has one: only a fresh unit shows the pattern to expect.
 """
 
 from __future__ import annotations

@@ -20,7 +20,7 @@ _BIN, _BEFORE, _AFTER = 8, 64, 320
 
 
 def panels(evidence: Evidence, frame_rate_hz: float) -> Iterator[PlotPanel]:
-    """The array's rate around rises and falls of uniform light, and what it lacks of the model's."""
+    """The array's rate around rises and falls of uniform light, and the same less the model's."""
     for t in takes(evidence, ("step",)):
         edges = edges_of(uniform_light(t.shown))
         for name, sign in (("rise", 1), ("fall", -1)):
@@ -60,9 +60,15 @@ def free_window(edges: Sequence[int], frames: int) -> tuple[int, int]:
 
 
 def around(observation: ObservedRecording, edges: Sequence[int], window: tuple[int, int]) -> tuple[Array, Array]:
-    """Middles of bins from an edge on [frames] and, mean over edges, spikes a frame of a pixel (bins, W columns).
+    """The array's rate around edges.
 
-    window: frames before and after an edge.
+    Args:
+        observation: of the recording.
+        edges: frames of the edges.
+        window: frames before and after an edge.
+
+    Returns:
+        Middles of bins from an edge on [frames], and spikes a frame of a pixel (bins, columns), mean over edges.
     """
     bins = np.arange(-window[0], window[1], _BIN)
     total = np.zeros((bins.size, observation.shape[1]))
