@@ -16,7 +16,7 @@ from typing import Any
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
 
 from spikecam_env.errors import InputError, unknown_name
-from spikecam_env.gap.report import rows, words
+from spikecam_env.gap.report import table_rows, words
 from spikecam_env.gap.report.parameters_off import response_spread
 from spikecam_env.gap.report.quantities import quantity, rough, three_digits
 from spikecam_env.gap.report.reproduce import command_of
@@ -65,13 +65,13 @@ def diagnosis_block(s: StatedDiagnosis) -> str:
 def short_block(s: StatedDiagnosis) -> str:
     """The verdict, how many statistics differ, and the gap: a paragraph."""
     d = s.diagnosis
-    compared = rows.compared(d) if d.statistics else ""
+    compared = table_rows.compared(d) if d.statistics else ""
     gap = gap_line(d.gap) if d.gap else ""
     parts = (f"**{heading(d)}.** {d.sentence}", compared, gap, f"*{s.about}; by {s.version}.*")
     return " ".join(filter(None, parts))
 
 
-def beside_measured(model: SensorModel) -> rows.Rows:
+def beside_measured(model: SensorModel) -> table_rows.Rows:
     """Effects of a page's model that the published one has not, beside the same of the preset `measured`."""
     published, measured = (SensorModel.preset(name) for name in ("scsim", "measured"))
     known, others = ({e.name: e.parameters() for e in other.effects} for other in (published, measured))
@@ -153,4 +153,4 @@ _TEMPLATES = Environment(
 )  # not escaped: Markdown of our own figures
 _TEMPLATES.filters["human"] = human
 _TEMPLATES.globals.update(MADE_BY=MADE_BY, beside_measured=beside_measured, gap_line=gap_line, heading=heading,
-                          rows=rows, table=table, words=words)  # fmt: skip
+                          rows=table_rows, table=table, words=words)  # fmt: skip

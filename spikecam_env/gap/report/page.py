@@ -10,7 +10,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from spikecam_env.gap.report import plots, quantities, reproduce, rows, words
+from spikecam_env.gap.report import plots, quantities, reproduce, table_rows, words
 from spikecam_env.gap.report.exhibits import LEAST_Z, by_z, exhibits
 from spikecam_env.gap.report.panels import shape_of
 from spikecam_env.gap.report.sentence import NO_BOUNDS, gap_line, heading
@@ -65,7 +65,7 @@ def report(diagnosis: Diagnosis, campaign_command: str = "") -> str:
         "gap_line": gap_line,
         "picture": picture,
     }
-    modules = {"plots": plots, "quantities": quantities, "reproduce": reproduce, "rows": rows, "words": words}
+    modules = {"plots": plots, "quantities": quantities, "reproduce": reproduce, "rows": table_rows, "words": words}
     return TEMPLATES.get_template("gap/report/report.html.jinja").render(context, **modules)
 
 

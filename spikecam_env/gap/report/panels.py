@@ -95,14 +95,26 @@ def takes(evidence: Evidence, kinds: Sequence[str]) -> list[ReportedRecording]:
     ]
 
 
-def over_pixels(
-    take: ReportedRecording, of: Callable[[ObservedRecording], Array]
-) -> tuple[Array, Array, Array | None, Array]:
-    """Means over the last axis: measured, before, after, and the standard error of measured less before."""
+class Curves(NamedTuple):
+    """Values at N points (N,): measured, before, after, and the standard error of measured less before."""
+
+    measured: Array
+    before: Array
+    after: Array | None
+    sd: Array
+
+    def less_model(self, scale: Array | float) -> Curves:
+        """The same less the model before, times `scale`."""
+        after = None if self.after is None else scale * (self.after - self.before)
+        return Curves(scale * (self.measured - self.before), np.zeros(len(self.before)), after, scale * self.sd)
+
+
+def over_pixels(take: ReportedRecording, of: Callable[[ObservedRecording], Array]) -> Curves:
+    """Means over the last axis of a quantity of each recording."""
     measured, before = of(take.measured), of(take.before)
     known = np.isfinite(measured) & np.isfinite(before)
     after = of(take.after) if take.after else None
-    return (
+    return Curves(
         mean_known(measured, known),
         mean_known(before, known),
         None if after is None else mean_known(after, np.isfinite(after)),
@@ -145,35 +157,14 @@ def scaled_by_twins(sd: Array, difference: Array | None) -> Array:
     return scaled
 
 
-def by_recording(
-    found: Sequence[ReportedRecording], of: Callable[[ObservedRecording], Array]
-) -> tuple[Array, Array, Array | None, Array]:
-    rows = [over_pixels(t, of) for t in found]
-    after = [r[2] for r in rows]
-    return (
-        np.array([r[0] for r in rows], dtype=np.float64),
-        np.array([r[1] for r in rows], dtype=np.float64),
-        None if any(a is None for a in after) else np.array(after, dtype=np.float64),
-        np.array([r[3] for r in rows], dtype=np.float64),
-    )
+def by_recording(recordings: Sequence[ReportedRecording], of: Callable[[ObservedRecording], Array]) -> Curves:
+    """A quantity of each recording, its mean over pixels."""
+    measured, before, after, sd = zip(*(over_pixels(t, of) for t in recordings), strict=True)
+    known = None if any(a is None for a in after) else np.array(after, dtype=np.float64)
+    return Curves(np.array(measured, np.float64), np.array(before, np.float64), known, np.array(sd, np.float64))
 
 
-def against_before(
-    title: str,
-    ylabel: str,
-    found: Sequence[ReportedRecording],
-    measured: Array,
-    before: Array,
-    after: Array | None,
-    sd: Array,
-    scale: Array,
-) -> PlotPanel:
-    """A quantity of each recording less the model's, times `scale`."""
-    return PlotPanel(
-        title, "", ylabel, np.arange(len(found), dtype=np.float64), scale * (measured - before), np.zeros(len(found)),
-        None if after is None else scale * (after - before), scale * sd, labels=names(found),
-    )  # fmt: skip
-
-
-def names(found: Sequence[ReportedRecording]) -> tuple[str, ...]:
-    return tuple(t.shown.name for t in found)
+def panel_by_recording(title: str, ylabel: str, recordings: Sequence[ReportedRecording], curves: Curves) -> PlotPanel:
+    """A plot with a point a recording."""
+    names = tuple(t.shown.name for t in recordings)
+    return PlotPanel(title, "", ylabel, np.arange(len(names), dtype=np.float64), *curves, labels=names)

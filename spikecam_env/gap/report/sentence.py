@@ -13,24 +13,24 @@ from spikecam_env.gap.twins.budget import Budget
 from spikecam_env.gap.verdict.notes import gap_is_fitted
 
 
-def sentence(found: Conclusion, model_name: str) -> str:
+def sentence(conclusion: Conclusion, model_name: str) -> str:
     """The verdict in one sentence; in two, where beside effects parameters are off."""
-    said = VERDICTS_IN_WORDS[found.verdict][1](found, model_name)
-    if found.verdict in ("named", "class") and found.parameters:
-        said += f" Parameters of the model {model_name} are off as well: {all_off(found)}."
+    said = VERDICTS_IN_WORDS[conclusion.verdict][1](conclusion, model_name)
+    if conclusion.verdict in ("named", "class") and conclusion.parameters:
+        said += f" Parameters of the model {model_name} are off as well: {all_off(conclusion)}."
     return said
 
 
-def none_sentence(found: Conclusion, model_name: str) -> str:
+def none_sentence(conclusion: Conclusion, model_name: str) -> str:
     """Nothing is off."""
     return f"No gap: these recordings and the model {model_name} agree to within the noise."
 
 
-def named_sentence(found: Conclusion, model_name: str) -> str:
+def named_sentence(conclusion: Conclusion, model_name: str) -> str:
     """Effects with their sizes."""
-    named = [f"{human(e.name)} ({plain_sizes(e)})" if e.parameters else human(e.name) for e in found.effects]
-    said = f"Your camera has {listed(named, 'and')}{removed_phrase(found, 'it' if len(named) == 1 else 'them')}."
-    return f"{said} {remainder_sentence(found.remainder, len(named))}" if found.remainder else said
+    named = [f"{human(e.name)} ({plain_sizes(e)})" if e.parameters else human(e.name) for e in conclusion.effects]
+    said = f"Your camera has {listed(named, 'and')}{removed_phrase(conclusion, 'it' if len(named) == 1 else 'them')}."
+    return f"{said} {remainder_sentence(conclusion.remainder, len(named))}" if conclusion.remainder else said
 
 
 def remainder_sentence(left: Remainder, names: int) -> str:
@@ -43,19 +43,19 @@ def remainder_sentence(left: Remainder, names: int) -> str:
     )
 
 
-def class_sentence(found: Conclusion, model_name: str) -> str:
+def class_sentence(conclusion: Conclusion, model_name: str) -> str:
     """Candidates that are tied, beside effects that are not."""
-    members = [human(str(name)) for name in (found.class_ or {}).get("members", ())]
-    beside = [human(e.name) for e in found.effects if human(e.name) not in members]
+    members = [human(str(name)) for name in (conclusion.class_ or {}).get("members", ())]
+    beside = [human(e.name) for e in conclusion.effects if human(e.name) not in members]
     said = listed([*beside, listed(members, "or")], "and")
-    removed = removed_phrase(found, "them" if beside else "either")
+    removed = removed_phrase(conclusion, "them" if beside else "either")
     return f"Your camera has {said}: these recordings do not show which{removed}."
 
 
-def unknown_sentence(found: Conclusion, model_name: str) -> str:
+def unknown_sentence(conclusion: Conclusion, model_name: str) -> str:
     """A gap that no candidate closes, or no single one where a second effect was not searched for."""
-    patch = removed_phrase(found, "an empirical patch")
-    about = found.unknown or {}
+    patch = removed_phrase(conclusion, "an empirical patch")
+    about = conclusion.unknown or {}
     if "not_looked_for" not in about:
         return f"Your camera does something that no candidate explains{patch}."
     best = f"; {human(about['best_candidate'])} comes nearest" if about["best_candidate"] else ""
@@ -65,14 +65,14 @@ def unknown_sentence(found: Conclusion, model_name: str) -> str:
     )
 
 
-def parameter_sentence(found: Conclusion, model_name: str) -> str:
+def parameter_sentence(conclusion: Conclusion, model_name: str) -> str:
     """Effects of the model whose strength is off."""
-    return f"No effect is missing, but parameters of the model {model_name} are off: {all_off(found)}."
+    return f"No effect is missing, but parameters of the model {model_name} are off: {all_off(conclusion)}."
 
 
-def data_sentence(found: Conclusion, model_name: str) -> str:
+def data_sentence(conclusion: Conclusion, model_name: str) -> str:
     """The first contradiction."""
-    said = found.notes[0].rstrip(".") if found.notes else "see the notes"
+    said = conclusion.notes[0].rstrip(".") if conclusion.notes else "see the notes"
     return f"The recordings contradict their own labels: {said}."
 
 
@@ -92,18 +92,18 @@ def heading(d: Diagnosis) -> str:
     return "Effect named, with a remainder" if d.remainder else VERDICTS_IN_WORDS[d.verdict][0]
 
 
-def all_off(found: Conclusion) -> str:
+def all_off(conclusion: Conclusion) -> str:
     """Strengths as measured, beside those of the model."""
-    rows = parameters_off(found.parameters, found.patched.circuit)
+    rows = parameters_off(conclusion.parameters, conclusion.patched.circuit)
     return listed([f"{r.name} is {rough(r.measured, r.unit)}, not {rough(r.nominal, r.unit)}" for r in rows], "and")
 
 
-def removed_phrase(found: Conclusion, what: str) -> str:
+def removed_phrase(conclusion: Conclusion, what: str) -> str:
     """The share of the gap that an addition removes; empty where it removes none."""
-    gap = found.gap
+    gap = conclusion.gap
     if gap is None or not math.isfinite(gap.removed) or gap.removed <= 0:
         return ""
-    fitted = gap_is_fitted(found.notes)
+    fitted = gap_is_fitted(conclusion.notes)
     which = "the held-out recordings, which were fitted too" if fitted else "recordings that were not used"
     return f"; adding {what} removes {100 * min(gap.removed, 1.0):.0f} % of the gap on {which}"
 

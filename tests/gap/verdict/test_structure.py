@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from spikecam_env.gap.compare.prediction import Null
-from spikecam_env.gap.report.rows import STRUCTURE
+from spikecam_env.gap.report.table_rows import STRUCTURE
 from spikecam_env.gap.statistics import StatisticKey
 from spikecam_env.gap.verdict import structure as module
 from spikecam_env.gap.verdict.structure import level_exponent, structure

@@ -8,7 +8,7 @@ from itertools import pairwise
 import numpy as np
 
 from spikecam_env.gap.observe.observation import ObservedRecording
-from spikecam_env.gap.report.panels import Array, PlotPanel, takes
+from spikecam_env.gap.report.panels import Array, Curves, PlotPanel, takes
 from spikecam_env.gap.result import Evidence
 from spikecam_env.gap.statistics.step import edges_of, uniform_light
 
@@ -33,24 +33,14 @@ def panels(evidence: Evidence, frame_rate_hz: float) -> Iterator[PlotPanel]:
             after = around(t.after, mine, window)[1].mean(axis=1) if t.after else None
             ms = x * 1e3 / frame_rate_hz
             sd = (measured - before).std(axis=1) / np.sqrt(measured.shape[1])
-            rates = PlotPanel(
-                f"Rate around a {name} ({t.shown.name})",
-                f"time from the {name} [ms]",
-                "rate [spikes/frame]",
-                ms,
-                measured.mean(axis=1),
-                before.mean(axis=1),
-                after,
-                sd,
-            )
+            rates = Curves(measured.mean(axis=1), before.mean(axis=1), after, sd)
             height = abs(rates.before[x > 0].mean() - rates.before[x < 0].mean())
-            scale = 100 / max(height, 1e-9)
-            yield rates
+            off = rates.less_model(100 / max(height, 1e-9))
+            xlabel = f"time from the {name} [ms]"
+            yield PlotPanel(f"Rate around a {name} ({t.shown.name})", xlabel, "rate [spikes/frame]", ms, *rates)
             yield PlotPanel(
-                f"Residual after a {name} ({t.shown.name})", f"time from the {name} [ms]",
-                "less the model's [% of step]", ms, scale * (rates.measured - rates.before), np.zeros(x.size),
-                None if after is None else scale * (after - rates.before), scale * sd,
-            )  # fmt: skip
+                f"Residual after a {name} ({t.shown.name})", xlabel, "less the model's [% of step]", ms, *off
+            )
 
 
 def free_window(edges: Sequence[int], frames: int) -> tuple[int, int]:
