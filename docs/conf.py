@@ -1,20 +1,19 @@
-"""The documentation as a site: `make docs`.  What is special to this repository is in tools/site."""
+"""The documentation as a site: `make docs`.  Additions of this repository are in tools/site."""
 
 import inspect
 import sys
-from dataclasses import fields, is_dataclass
 from pathlib import Path
 
 from pygments.lexers.special import TextLexer
+from sphinx.util.inspect import stringify_signature
 
 ROOT = Path(__file__).resolve().parents[1]
 sys.path.insert(0, str(ROOT))
 
 from spikecam_env import __version__  # noqa: E402
 from tools.site import films  # noqa: E402
-from tools.site.docstrings import rendered  # noqa: E402
+from tools.site.docstrings import TASK_SECTIONS, as_restructured  # noqa: E402
 from tools.site.pages import filled_in  # noqa: E402
-from tools.site.signatures import signature_of  # noqa: E402
 
 project = "spikecam-env"
 author = "the spikecam-env authors"
@@ -22,7 +21,7 @@ copyright = author
 version = release = __version__
 language = "en"
 
-extensions = ["myst_parser", "sphinx.ext.autodoc", "sphinx.ext.viewcode", "sphinx_copybutton"]
+extensions = ["myst_parser", "sphinx.ext.autodoc", "sphinx.ext.napoleon", "sphinx.ext.viewcode", "sphinx_copybutton"]
 exclude_patterns = ["_build"]
 myst_enable_extensions = ["deflist"]
 myst_heading_anchors = 4
@@ -35,6 +34,10 @@ suppress_warnings = ["ref.python"]
 
 autodoc_member_order = "bysource"
 autodoc_inherit_docstrings = False
+napoleon_numpy_docstring = False
+napoleon_use_param = False  # entries such as `rows, columns: size` have two names
+napoleon_use_rtype = False
+napoleon_custom_sections = [(title, "returns_style") for title in TASK_SECTIONS]
 python_maximum_signature_line_length = 80
 toc_object_entries_show_parents = "hide"
 
@@ -57,27 +60,26 @@ def read_page(app, docname, source):
 
 
 def read_docstring(app, what, name, value, options, lines):
-    lines[:] = rendered("\n".join(lines), arguments(value))
+    lines[:] = as_restructured("\n".join(lines), attribute=what in ("attribute", "data", "property"))
 
 
-def read_signature(app, what, name, value, options, signature, return_annotation):
-    if what in ("class", "function", "method"):
-        return signature_of(value, bound=what == "method" and not inspect.ismethod(value))
-    return None
-
-
-def arguments(value):
-    """Names that a docstring may explain as `name: meaning`."""
-    names = {f.name for f in fields(value)} if is_dataclass(value) else set()
+def read_signature(app, what, name, value, options, arguments, returned):
+    """Types as they are written: `NDArray[np.float32]`, and not the class that this name stands for."""
+    if what not in ("class", "function", "method"):
+        return None
     try:
-        return names | set(inspect.signature(value).parameters)
-    except (TypeError, ValueError):  # what is built in has none
-        return names
+        signature = inspect.signature(value)
+    except (TypeError, ValueError):  # of a class from elsewhere
+        return None
+    given = [p for p in signature.parameters.values() if p.name != "self"]
+    arguments = stringify_signature(signature.replace(parameters=given), show_return_annotation=False)
+    returned = signature.return_annotation
+    return arguments, returned if what != "class" and isinstance(returned, str) else ""
 
 
 def setup(app):
     films.setup(app)
     app.add_lexer("csv", TextLexer)  # Pygments has none
     app.connect("source-read", read_page)
-    app.connect("autodoc-process-docstring", read_docstring)
+    app.connect("autodoc-process-docstring", read_docstring, priority=400)  # before Napoleon
     app.connect("autodoc-process-signature", read_signature)

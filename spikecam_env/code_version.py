@@ -1,8 +1,8 @@
 """The version of the code that makes a result: a digest of the modules that take part, whatever their form.
 
-Counted is what a module does: its syntax tree without docstrings, and so without comments and layout; and the data
-files beside it (presets, templates).  Taking part is what a module imports of its own package, and so on; a package
-that loads its modules by `pkgutil`, as the catalogue of effects does, imports all of them.
+A module counts by its syntax tree without docstrings, and so without comments and layout.  Data files beside it count
+too (presets, templates).  The modules that it imports of its own package take part, and so on.  A package that loads
+its modules by `pkgutil`, as the catalogue of effects does, imports all of them.
 """
 
 from __future__ import annotations
@@ -20,9 +20,9 @@ DIGITS = 12
 """Hexadecimal digits of a digest: two of a thousand versions are the same by chance once in 1e9."""
 
 UNREADABLE = "unknown"
-"""What is said where the package was installed without its sources."""
+"""The version where the package was installed without its sources."""
 
-DATA_SUFFIXES = (".npz", ".toml")
+DATA_SUFFIXES = (".npz", ".toml", ".jinja")
 """Endings of the data files that count."""
 
 
@@ -35,7 +35,7 @@ def code_version(*modules: str, root: Path = ROOT) -> str:
         root: folder of the package.
 
     Returns:
-        DIGITS hexadecimal digits; UNREADABLE where a source is not there.
+        DIGITS hexadecimal digits; UNREADABLE where a source is missing.
     """
     digest = hashlib.sha256()
     try:
@@ -50,7 +50,8 @@ def code_version(*modules: str, root: Path = ROOT) -> str:
 def sources_of(modules: tuple[str, ...], root: Path = ROOT) -> list[Path]:
     """Files of modules and of all that they import of the package in `root`, with the data beside them, in order.
 
-    Raises FileNotFoundError where a module has no source.
+    Raises:
+        FileNotFoundError: where a module has no source.
     """
     waiting, found = [_file_of(name, root) for name in modules], dict.fromkeys((root / "__init__.py",))
     while waiting:
@@ -92,7 +93,7 @@ def _file_of(name: str, root: Path) -> Path:
 
 
 def meaning_of(path: Path) -> str:
-    """What a source does, the same for every form of it and in every version of Python.
+    """The syntax tree of a source as text, the same for every layout and in every version of Python.
 
     (`ast.dump` and `ast.unparse` differ between versions.)
     """

@@ -1,8 +1,8 @@
 """Blocks of the pages, and the comments above them that say how they are tested (CONTRIBUTING.md, "Docs that run").
 
 <!-- at small size: OLD -> NEW; --option value -->   replacements, and options added to every `spikecam` line
-<!-- given: CODE -->                                 Python that is run before the block: what the reader has
-<!-- file: NAME -->                                  the block is what the file NAME holds; it is written, not run
+<!-- given: CODE -->                                 Python that is run before the block: names that the reader has
+<!-- file: NAME -->                                  the block is written as the file NAME, not run
 <!-- not run: REASON -->                             Python is compiled, command lines are read by their parser
 <!-- tested by: FILE -->                             above the first block: that test runs the page, this one reads it
 """
@@ -34,16 +34,19 @@ PROGRAMS = ("spikecam", "python", "make", "pip", "mkdir", "export", ".venv/bin/s
 
 @dataclass(frozen=True)
 class Block:
-    """kind: PYTHON, COMMANDS or TEXT.  line: where its code begins, from 1.  marks: by the comment's first words."""
+    """A block of code on a page."""
 
     kind: str
+    """PYTHON, COMMANDS or TEXT."""
     code: str
     line: int
+    """Where its code begins, from 1."""
     marks: dict[str, str] = field(default_factory=dict)
+    """Comments above it, by their first words."""
 
     @property
     def small(self) -> str:
-        """The code with its replacements; raises ValueError for one whose old text is not there."""
+        """The code with its replacements; ValueError for one whose old text the block does not hold."""
         code = self.code
         for old, new in self.replacements:
             if old not in code:

@@ -1,11 +1,11 @@
 """The committed pages of diagnoses, and every figure about them in the docs.
 
-    python -m tools.pages                    what the code or a command has changed for is made anew; a minute a page
+    python -m tools.pages                    pages whose code or command has changed; three minutes a page
     python -m tools.pages --only wall --anew
 
 Each page states the code that made it (`spikecam_env/code_version.py`); one whose code is today's is kept, so that a
-run that was stopped goes on.  Blocks of figures (`tools/figure_blocks.py`) are read from the pages and written into
-every document that has a place for them.
+run that was stopped goes on.  Blocks of figures (`tools/figure_blocks.py`) are made of the files beside the pages
+(`tools/stated_diagnosis.py`) and written into every document that has a place for them.
 """
 
 from __future__ import annotations
@@ -31,26 +31,27 @@ from spikecam_env.gap.report.page import write_report
 from spikecam_env.gap.report.reproduce import version_of_code
 from spikecam_env.version import __version__
 from spikecam_env.whole import check_file, whole_file, write_text_whole
-from tools.figure_blocks import filled, ladder_block, ladder_short_block, page_block, short_block
+from tools.figure_blocks import diagnosis_block, filled, ladder_block, ladder_short_block, short_block
 from tools.page_blocks import PAGES as PAGES_OF_DOCS
-from tools.page_reading import read_page
+from tools.real_recordings import REAL
+from tools.stated_diagnosis import StatedDiagnosis
 
 REPOSITORY = Path(__file__).parents[1]
 DOCS = REPOSITORY / "docs"
-REAL = Path("../shared/data/real")
-"""Where the real recordings are, from the checkout; they are not ours to pass on."""
-
 LADDER_MADE_BY = ("spikecam_env.gap.ladder", "spikecam_env.campaign")
 """Modules that make the ladder and the campaign that it climbs."""
 
 
 @dataclass(frozen=True)
 class RealPage:
-    """The diagnosis of a real recording.  name: of the campaign; file: of the recording; options: of its import."""
+    """The diagnosis of a real recording."""
 
     name: str
+    """Of the campaign."""
     file: str
+    """Of the recording."""
     options: str
+    """Of its import."""
     page: Path
     model: str = "scsim"
 
@@ -65,11 +66,10 @@ class RealPage:
 
     def is_fresh(self) -> bool:
         """Whether today's code made the page, by today's commands."""
-        if not self.page.is_file():
+        if not self.page.with_suffix(".json").is_file():
             return False
-        found = read_page(self.page)
-        commands = "\n".join(found.texts("reproduce", "pre"))
-        return found.version == version_of_code() and self.campaign_command in commands
+        stated = StatedDiagnosis.read(self.page)
+        return (stated.version, stated.campaign_command) == (version_of_code(), self.campaign_command)
 
     def make(self, data: Path, jobs: int) -> None:
         """Import, diagnose, write the page."""
@@ -79,11 +79,12 @@ class RealPage:
             done_by_command(["campaign", "import", str(data), campaign, *self.options.split()])
             found = replace(diagnose(campaign, self.model, jobs=jobs), campaign=self.name)
             write_report(found, self.page, self.campaign_command)
+            StatedDiagnosis.of(found, self.campaign_command).write(self.page)
 
     def blocks(self) -> dict[str, str]:
         """Figures of the page by the names of their blocks."""
-        found = read_page(self.page)
-        return {self.name: page_block(found), f"{self.name}, short": short_block(found)}
+        stated = StatedDiagnosis.read(self.page)
+        return {self.name: diagnosis_block(stated), f"{self.name}, short": short_block(stated)}
 
 
 @dataclass(frozen=True)
@@ -107,7 +108,7 @@ class LadderFigure:
         return self.figures.is_file() and self.stated()["version"] == self.version()
 
     def stated(self) -> dict[str, Any]:
-        """What is written of it."""
+        """The figures beside the picture."""
         found: dict[str, Any] = json.loads(self.figures.read_text(encoding="utf-8"))
         return found
 
@@ -129,7 +130,7 @@ class LadderFigure:
             write_text_whole(self.figures, json.dumps(self.figures_of(made), indent=1) + "\n")
 
     def figures_of(self, made: Ladder) -> dict[str, Any]:
-        """What is kept of it."""
+        """Figures that are written beside the picture."""
         return {**made.to_json(), "first": self.first, "truth": self.truth, "version": self.version()}
 
     def blocks(self) -> dict[str, str]:
@@ -154,7 +155,11 @@ PAGES: tuple[RealPage | LadderFigure, ...] = (WALL, MAPS, LadderFigure())
 
 
 def done_by_command(words: Sequence[str]) -> None:
-    """Run a `spikecam` command; InputError where it fails, which has said why."""
+    """Run a `spikecam` command, which says itself why it fails.
+
+    Raises:
+        InputError: where it fails.
+    """
     if run(list(words)):
         raise InputError(f"spikecam {' '.join(words)} failed")
 
@@ -179,7 +184,7 @@ def write_blocks(say: Callable[[str], None] = print) -> None:
             say(f"{path.relative_to(REPOSITORY)}: figures written")
 
 
-def main(data: Path = REPOSITORY / REAL, only: tuple[str, ...] = (), jobs: int = 1, anew: bool = False) -> None:
+def main(data: Path = REAL, only: tuple[str, ...] = (), jobs: int = 1, anew: bool = False) -> None:
     """Make the pages whose code has changed, and write their figures into the docs.
 
     Args:

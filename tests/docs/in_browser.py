@@ -22,7 +22,7 @@ LONGEST_S = 300
 
 MEASURED = """<!doctype html><iframe id="frame" style="border:0;height:900px"></iframe><script>
 const pages = PAGES, widths = WIDTHS, found = [];
-const wait = (what, name) => new Promise(done => what.addEventListener(name, done, {once: true}));
+const wait = (target, name) => new Promise(done => target.addEventListener(name, done, {once: true}));
 const cut = p => p.scrollWidth > p.clientWidth + 1;
 const plays = film => { const ready = Promise.race([wait(film, "canplay").then(() => true),
   wait(film, "error").then(() => false)]); film.preload = "auto"; film.load(); return ready; };
@@ -37,7 +37,8 @@ async function measure() {
     if (width === widths[0]) for (const film of films) played.push(await plays(film));
     const blocks = [...d.querySelectorAll("pre")];
     found.push({page, width, page_width: d.documentElement.scrollWidth, blocks: blocks.length,
-      cut: blocks.filter(cut).map(p => p.textContent), copied: d.querySelectorAll("button.copybtn").length,
+      cut: [...d.querySelectorAll("pre, .wide")].filter(cut).map(p => p.textContent),
+      copied: d.querySelectorAll("button.copybtn").length,
       films: films.length, still: films.filter((_, i) => played[i] === false).map(f => f.currentSrc)});
   }
   await fetch("WHERE", {method: "POST", mode: "no-cors", body: JSON.stringify(found)});
@@ -59,7 +60,7 @@ class Laid:
     blocks: int
     """Blocks of code."""
     cut: tuple[str, ...]
-    """Text of the blocks that scroll."""
+    """Text of the blocks and of the tables of reports that scroll."""
     copied: int
     """Buttons that copy a block."""
     films: int

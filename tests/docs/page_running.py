@@ -30,7 +30,7 @@ from tools.page_blocks import COMMANDS, PYTHON, ROOT, Block, command_lines
 INSTALLED = f"{sys.executable} -m spikecam_env"
 ENVIRONMENT = re.compile(r"^[A-Z_]+=\S+ ")
 SHELL = ("mkdir", "cp", "mv", "ls", "cat")
-"""What a page may do in its folder besides `spikecam` and `python`."""
+"""Other programs than `spikecam` and `python` that a page may run in its folder."""
 
 
 @dataclass
@@ -57,9 +57,9 @@ class Page:
                 self._line(line, block)
 
     def bring(self, code: str) -> None:
-        """Make the files that stand for what the reader has, where the block names one and it is not there yet.
+        """Make the files that the block names, that a reader brings and that the folder does not hold yet.
 
-        What a line of the block makes (`--out NAME`) is not brought.
+        Files that a line of the block makes (`--out NAME`) are not brought.
         """
         for name, make in BROUGHT.items():
             if re.search(rf"(?<![\w./-])(?<!--out ){re.escape(name)}(?![\w-])", code) and not Path(name).exists():
@@ -69,7 +69,7 @@ class Page:
         exec(compile("\n" * (line - 1) + code, self.module.__name__, "exec"), self.module.__dict__)
 
     def environment(self, line: str) -> None:
-        """Set what a line sets before its program."""
+        """Set the variables that a line sets before its program."""
         for word in ENVIRONMENT.findall(line):
             self.patch.setenv(*word.strip().split("="))
 

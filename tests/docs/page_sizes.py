@@ -1,4 +1,4 @@
-"""How large what the pages show is when it is tested, and what stands for files that a reader brings."""
+"""Small sizes for the tests of pages, and stand-ins for files that a reader brings."""
 
 from __future__ import annotations
 
@@ -113,4 +113,4 @@ BROUGHT: dict[str, Callable[[Path], None]] = {
     "camera-17": _campaign,
     "calibrated": _calibrated,
 }
-"""What a reader brings, by the names that pages give it; made where a block names it."""
+"""Files that a reader brings, by the names that pages give them; made where a block names it."""

@@ -1,4 +1,4 @@
-"""The page of benchmarks says what the files of each version say, a point a version."""
+"""The page of benchmarks states the figures of every version's files, a point a version."""
 
 from __future__ import annotations
 

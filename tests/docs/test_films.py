@@ -1,4 +1,4 @@
-"""Films of the pages: each is what the command below it makes, and plays where a browser plays H.264."""
+"""Films of the pages: the command below each makes it, and it plays where a browser plays H.264."""
 
 from __future__ import annotations
 

@@ -88,7 +88,7 @@ def test_command_lines_within_the_text_are_understood(page: Path) -> None:
 
 
 def read_shorthand(line: str) -> None:
-    """Read a command line of the text, which may leave out what the command needs besides, or ask for help."""
+    """Read a command line of the text, which may leave out required options, or ask for help."""
     said = io.StringIO()
     try:
         with redirect_stderr(said), redirect_stdout(said):

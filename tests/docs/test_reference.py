@@ -1,8 +1,9 @@
-"""The reference has every public name, command and option, and the examples of docstrings do what they say."""
+"""The reference has every public name, command and option; docstrings have one form, and their examples hold."""
 
 from __future__ import annotations
 
 import doctest
+import inspect
 import re
 from importlib import import_module
 from pathlib import Path
@@ -10,10 +11,11 @@ from typing import Any
 
 import numpy as np
 import pytest
+from sphinx.ext.napoleon import Config, GoogleDocstring
 
 from spikecam_env.cli.first_words import commands_of, options_of
 from tools.site import commands
-from tools.site.docstrings import rendered
+from tools.site.docstrings import TASK_SECTIONS, as_restructured
 from tools.site.pages import GENERATED, ROOT, filled_in
 from tools.site.public import MODULES, docstring_of, home_of, kind_of, names_of
 
@@ -22,6 +24,11 @@ PACKAGES = ("spikecam_env", "spikecam_env.sensor", "spikecam_env.streams", "spik
             "spikecam_env.calibration", "spikecam_env.campaign", "spikecam_env.envs.wrappers", "scenes",
             "scenes.catalogue", "denoiser")  # fmt: skip
 """Packages whose names users import; each is in the reference, whatever else is."""
+SECTION = re.compile(r"^(Args|Returns|Yields|Raises|Example):$", re.MULTILINE)
+OTHER_FORMS = re.compile(
+    r"\b(?:Errors?: |Raises (?:\w+Error|it\b))|^>>>|^(?:Args|Returns|Yields|Raises|Examples?): ?\S", re.MULTILINE
+)
+"""Errors in prose, examples without a heading, and headings with text behind them."""
 NAMES = [(module, name) for module in MODULES for name in names_of(module) if home_of(module, name) == module]
 
 
@@ -34,6 +41,23 @@ def test_every_module_of_the_reference_stands_on_one_page() -> None:
 def test_a_public_name_says_what_it_is(module: str, name: str) -> None:
     value = getattr(import_module(module), name)
     assert docstring_of(module, name) or kind_of(value) == "module"
+
+
+def explained(module: str, name: str) -> list[tuple[Any, str]]:
+    """A public name and, of a class, its public methods, each with its docstring."""
+    value = getattr(import_module(module), name)
+    inside = vars(value).items() if kind_of(value) == "class" else ()
+    methods = [getattr(value, key) for key, member in inside if not key.startswith("_") and inspect.isroutine(member)]
+    return [(value, docstring_of(module, name)), *((method, inspect.getdoc(method) or "") for method in methods)]
+
+
+@pytest.mark.parametrize("module, name", NAMES, ids=lambda part: part)
+def test_a_docstring_has_sections_where_it_says_more_than_a_line_and_no_other_form(module: str, name: str) -> None:
+    for value, text in explained(module, name):
+        assert not OTHER_FORMS.search(text), f"{value}: {OTHER_FORMS.search(text)}"
+        takes_arguments = inspect.isroutine(value) and {*inspect.signature(value).parameters} - {"self"}
+        if takes_arguments and "\n\n" in text:
+            assert SECTION.search(text), f"{value} says more than a line and has no section"
 
 
 @pytest.fixture(scope="module")
@@ -52,91 +76,48 @@ def test_every_option_of_a_command_is_in_the_reference(words: tuple[str, ...], k
     assert written == (set() if commands_of(kind) else options_of(kind))
 
 
-def test_docstrings_become_fields_and_nothing_of_them_is_markup() -> None:
-    text = """A camera of `shape` pixels: 2*3.
+def napoleon(text: str, **options: bool) -> str:
+    """A docstring as docs/conf.py has it read, a space between words."""
+    config = Config(napoleon_use_param=False, napoleon_use_rtype=False,
+                    napoleon_custom_sections=[(title, "returns_style") for title in TASK_SECTIONS])  # fmt: skip
+    made = GoogleDocstring(as_restructured(text, **options), config)
+    return re.sub(r"(?<!\\)\s+", " ", str(made)).strip()
+
+
+def test_sections_of_a_docstring_become_fields_and_only_code_is_markup() -> None:
+    text = """A camera of `shape` pixels: 2*3, |z|, seed_.
 
     T = 1/x
 
-model: what kind of
-    camera.  seed: which unit.
-radius     [pixels] of the disk
-           at rest
-Raises InputError for a seed_ below 0.
-
->>> 1 + 1
-2
-"""
-    lines = rendered(text, ("model", "seed", "radius"))
-    assert lines[:1] == [r"A camera of \ ``shape``\  pixels: 2\*3."]
-    assert "       T = 1/x" in lines and "::" in lines
-    fields = [line for line in lines if line.startswith(":")][1:]
-    assert fields == [
-        ":param model: what kind of camera.",
-        ":param seed: which unit.",
-        ":param radius: [pixels] of the disk at rest",
-        r":raises InputError: for a seed\_ below 0.",
-    ]
-    assert lines[-3:] == [">>> 1 + 1", "2", ""]
-
-
-def test_sections_of_a_docstring_become_fields() -> None:
-    text = """A camera.
-
 Args:
-    model: what kind of
-        camera, a `str`.
+    model: a `str`.
     rows, columns: size.
 
 Returns:
-    (T, H, W) uint8.
+    (T, H, W) uint8: spikes.
 
 Raises:
     InputError: for a seed_ below 0.
 
 Example:
-    >>> 1 + 1
-    2
+    >>> 1 * 1
+    1
 """
-    assert rendered(text) == [
-        "A camera.",
-        "",
-        r":param model: what kind of camera, a \ ``str``\ .",
-        ":param rows: size.",
-        ":param columns: size.",
-        ":returns: (T, H, W) uint8.",
-        r":raises InputError: for a seed\_ below 0.",
-        "",
-        ">>> 1 + 1",
-        "2",
-        "",
-    ]
+    assert napoleon(text) == (
+        r"A camera of \ ``shape``\  pixels: 2\*3, \|z\|, seed\_. :: T = 1/x "
+        r":Parameters: * **model** -- a \ ``str``\ . * **rows, columns** -- size. :returns: (T, H, W) uint8: spikes. "
+        r":raises InputError: for a seed\_ below 0. .. rubric:: Example >>> 1 * 1 1"
+    )
 
 
-@pytest.mark.parametrize(
-    "text, code",
-    [
-        ('env = gymnasium.make_vec("spikecam_env/Fan-v0", num_envs=2)', True),
-        ("import numpy", True),
-        ("T = 1/x + tau", False),
-        ("x <- x (1 - exp(-t/tau))", False),
-        ("begin    what the effect remembers", False),
-    ],
-)
-def test_python_in_a_docstring_is_code_and_a_formula_is_not(text: str, code: bool) -> None:
-    assert (".. code-block:: python" in rendered(f"A camera.\n\n    {text}\n")) is code
-
-
-def test_a_paragraph_of_titled_lines_becomes_a_list_and_one_titled_line_stays_prose() -> None:
-    assert rendered("A task.\n\nScene: a disc\n    turns.\nAction: `two` numbers: pan, tilt.")[2:4] == [
-        ":Scene: a disc turns.",
-        r":Action: \ ``two``\  numbers: pan, tilt.",
-    ]
-    assert rendered("A task.\n\nScene: a disc.")[2] == "Scene: a disc."
+def test_parts_of_a_task_become_fields_and_an_attribute_has_no_type_in_its_words() -> None:
+    text = "A task.\n\nScene:\n    a disc: it\n    turns.\nAction:\n    two numbers."
+    assert napoleon(text) == "A task. :Scene: a disc: it turns. :Action: two numbers."
+    assert napoleon("Least: most.", attribute=True) == ": Least: most."
 
 
 def examples_of(module: str, name: str) -> list[doctest.DocTest]:
-    """Of a function or class and its methods, with what the reference says they begin with: numpy, and the names of
-    their module."""
+    """Examples of a function, or of a class and its methods; given are numpy and the names of their module."""
     value = getattr(import_module(module), name)
     if kind_of(value) not in ("class", "function"):
         return []

@@ -1,4 +1,4 @@
-"""Committed pages: the figures about them in the docs are theirs, and they are by today's code.
+"""Committed diagnoses: the figures in the docs are theirs, and they are by today's code.
 
 python -m tools.pages makes them anew.
 """
@@ -12,17 +12,15 @@ import made_up
 import pytest
 
 from spikecam_env.errors import InputError
-from spikecam_env.gap.report.cells import number
-from spikecam_env.gap.report.page import write_report
-from spikecam_env.gap.report.quantities import quantity
-from spikecam_env.gap.report.sentence import gap_line
-from spikecam_env.gap.report.words import HEADINGS, human, parameter_unit
+from spikecam_env.gap.report.quantities import number, quantity
+from spikecam_env.gap.report.sentence import gap_line, heading
+from spikecam_env.gap.report.words import human, parameter_unit
 from spikecam_env.gap.result import VERDICTS
 from tools import pages
-from tools.figure_blocks import filled, page_block, short_block
-from tools.page_reading import read_page
+from tools.figure_blocks import diagnosis_block, filled, short_block
+from tools.real_recordings import REAL
+from tools.stated_diagnosis import StatedDiagnosis
 
-DATA = pages.REPOSITORY / pages.REAL
 PLACES = {
     "docs/real_data.md": {"wall", "maps"},
     "docs/gap.md": {"ladder"},
@@ -46,14 +44,13 @@ def test_every_block_of_figures_has_its_place() -> None:
 
 @pytest.mark.parametrize("page", pages.PAGES, ids=lambda page: page.name)
 def test_every_block_says_the_version_of_its_page(page) -> None:
-    version = page.stated()["version"] if page.name == "ladder" else read_page(page.page).version
+    version = page.stated()["version"] if page.name == "ladder" else StatedDiagnosis.read(page.page).version
     assert re.fullmatch(r"spikecam-env \S+, code [0-9a-f]{12}", version), ANEW
+    assert page.name == "ladder" or version in page.page.read_text(encoding="utf-8")
     assert all(version in block for block in page.blocks().values())
 
 
-@pytest.mark.skipif(
-    not DATA.is_dir(), reason="without the real recordings (../shared/data/real) pages cannot be made anew"
-)
+@pytest.mark.skipif(not REAL.is_dir(), reason="without the real recordings pages cannot be made anew")
 @pytest.mark.parametrize("page", pages.PAGES, ids=lambda page: page.name)
 def test_the_pages_are_by_today_s_code(page) -> None:
     assert page.is_fresh(), f"the code that makes the page {page.name} has changed since; {ANEW}"
@@ -74,13 +71,16 @@ def test_a_block_that_nobody_writes_and_one_without_an_end_are_errors() -> None:
 
 
 @pytest.mark.parametrize("verdict", VERDICTS)
-def test_a_page_of_every_verdict_gives_its_figures(verdict: str, tmp_path) -> None:
-    d = replace(made_up.EVERY[verdict](), evidence=None)
-    write_report(d, tmp_path / "page.html", "spikecam campaign import")
-    page = read_page(tmp_path / "page.html")
-    whole, short = page_block(page), short_block(page)
+def test_a_diagnosis_of_every_verdict_gives_its_figures(verdict: str, tmp_path) -> None:
+    """Read from the files beside its page."""
+    made = StatedDiagnosis.of(made_up.EVERY[verdict](), "spikecam campaign import")
+    made.write(tmp_path / "page.html")
+    stated = StatedDiagnosis.read(tmp_path / "page.html")
+    d = stated.diagnosis
+    assert d == replace(made.diagnosis, evidence=None, motion=(), stages={})
+    whole, short = diagnosis_block(stated), short_block(stated)
     for block in (whole, short):
-        assert d.sentence in block and HEADINGS[verdict] in block and page.version in block
+        assert d.sentence in block and heading(d) in block and stated.version in block and stated.about in block
         assert d.gap is None or gap_line(d.gap) in block
     for r in d.ranking:
         assert f"| {human(r.name)} | {number(r.misfit)} |" in whole and r.reason in whole

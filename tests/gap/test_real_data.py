@@ -14,8 +14,8 @@ from spikecam_env.gap.compare.distance import adjusted, deviates
 from spikecam_env.gap.compare.prediction import values_of
 from spikecam_env.gap.diagnose import diagnose, observed, read_case
 from spikecam_env.sensor import SensorModel
+from tools.real_recordings import REAL
 
-REAL = Path(__file__).parents[2].parent / "shared" / "data" / "real"
 pytestmark = [
     pytest.mark.slow,
     pytest.mark.skipif(not REAL.is_dir(), reason=f"the real recordings are not at {REAL}"),

@@ -1,8 +1,8 @@
-"""The page of benchmarks: a table a bench and a point a version, from what `spikecam bench WHAT --out FILE` writes.
+"""The page of benchmarks: a table a bench and a point a version, from files of `spikecam bench NAME --out FILE`.
 
-    docs/benchmarks/VERSION/WHAT.json        {"machine": text, "rows": [{...}]} or {"rows": {title: [{...}]}}
+    docs/benchmarks/VERSION/NAME.json        {"machine": text, "rows": [{...}]} or {"rows": {title: [{...}]}}
 
-Of a row, text and whole numbers say what was measured; figures are its numbers with a point.
+Text and whole numbers of a row name the measurement; its numbers with a point are figures.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ SHOWN = re.compile(r"^x |/s$")
 WIDTH, HEIGHT, EDGE = 120, 28, 5
 """Of the drawing of a row [px]."""
 Figures = dict[tuple[str, str], dict[str, float]]
-"""(what was measured, figure) -> version -> value."""
+"""(measurement, figure) -> version -> value."""
 
 
 def page(folder: Path = FOLDER) -> str:

@@ -1,4 +1,4 @@
-"""The command line reference: what `spikecam ... --help` prints, as Markdown."""
+"""The command line reference: the texts of `spikecam ... --help` as Markdown."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ ENDING = re.compile(r" ?\((?:(default): (?P<default>.*)|(?P<word>required|repeat
 
 @dataclass(frozen=True)
 class Option:
-    """One entry of a help text: how it is written, what it means, and its default ("required", "repeatable")."""
+    """One entry of a help text; its default may be "required" or "repeatable"."""
 
     written: str
     meaning: str
@@ -107,7 +107,7 @@ def _help(words: tuple[str, ...]) -> str:
 
 
 def _boxes(text: str) -> list[list[str]]:
-    """Lines of each framed part of a help text, without what introduces it."""
+    """Lines of each framed part of a help text, without its introduction."""
     boxes: list[list[str]] = []
     for line in text.splitlines():
         if line.startswith("╭"):

@@ -73,7 +73,7 @@ def _gallery(films: list[Line]) -> str:
 
 
 class FilmNode(nodes.General, nodes.Element):  # type: ignore[misc]
-    """A film; `film` and `poster` are names among the site's downloads, `name` is what the page calls it."""
+    """A film; `film` and `poster` are names among the site's downloads, `name` is its name on the page."""
 
 
 class FilmDirective(SphinxDirective):

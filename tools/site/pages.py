@@ -1,11 +1,11 @@
-"""What is filled in as Sphinx reads a page of docs: the reference, and links to files that are no pages.
+"""Pages are filled in as Sphinx reads them: the reference, and links to files that are no pages.
 
 <!-- generated: commands -->        the command line reference
-<!-- generated: api MODULE -->      what a module offers
+<!-- generated: api MODULE -->      public names of a module
 <!-- generated: formats -->         the table of file formats
 <!-- generated: benchmarks -->      speed by version
 <!-- generated: settings -->        settings of a diagnosis
-<!-- generated: task NAME -->       a task: what its class says of it, and its scores
+<!-- generated: task NAME -->       a task: the docstring of its class, and its scores
 <!-- generated: page FILE -->       a page at the root
 <!-- generated: part FILE TITLE --> a section of it, without its title
 
@@ -22,7 +22,7 @@ from importlib import import_module
 from pathlib import Path, PurePosixPath
 
 from tools.site import benchmarks, commands, settings, tasks
-from tools.site.docstrings import rendered
+from tools.site.docstrings import as_restructured
 from tools.site.films import as_directives
 from tools.site.public import docstring_of, home_of, kind_of, names_of
 from tools.site.sections import section
@@ -35,7 +35,12 @@ PAGES = {"README.md": "index.md", "CHANGELOG.md": "project/changelog.md", "CONTR
 
 
 def filled_in(text: str, page: str) -> str:
-    """The Markdown of a page as Sphinx is to read it.  page: its path below docs, e.g. `reference/index.md`."""
+    """The Markdown of a page as Sphinx is to read it.
+
+    Args:
+        text: the page.
+        page: its path below docs, e.g. `reference/index.md`.
+    """
     folder = PurePosixPath(page).parent
     whole = as_directives(GENERATED.sub(lambda found: generated(found["what"], found["of"], folder), text))
     return LINK.sub(lambda found: _link(found, folder), whole)
@@ -81,9 +86,18 @@ def _moved(found: re.Match[str], folder: Path) -> str:
 
 
 def _module(module: str) -> list[str]:
-    """Sphinx's directives for a module and all that it offers, each with its docstring."""
+    """Sphinx's directives for a module and its public names, each with its docstring."""
     docstring = import_module(module).__doc__ or ""
-    lines = [f"## {module}", "", "```{eval-rst}", f".. py:module:: {module}", "", *rendered(docstring), "```", ""]
+    lines = [
+        f"## {module}",
+        "",
+        "```{eval-rst}",
+        f".. py:module:: {module}",
+        "",
+        *as_restructured(docstring),
+        "```",
+        "",
+    ]
     for name in names_of(module):
         value = getattr(import_module(module), name)
         kind = kind_of(value)
@@ -96,7 +110,7 @@ def _module(module: str) -> list[str]:
                 "",
             ]
         elif kind == "data":
-            text = ["   " + line for line in rendered(docstring_of(module, name))]
+            text = ["   " + line for line in as_restructured(docstring_of(module, name))]
             lines += ["```{eval-rst}", f".. py:data:: {name}", f"   :module: {module}", "", *text, "```", ""]
         elif kind != "module":
             lines += ["```{eval-rst}", directive, *(["   :members:"] if kind == "class" else []), "```", ""]

@@ -1,4 +1,4 @@
-"""The modules of the API reference, and the names that each of them offers."""
+"""The modules of the API reference, and the public names of each."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ MODULES = (
 
 
 def names_of(module: str) -> list[str]:
-    """What a module offers: its `__all__`, or the functions and classes that it defines, private ones apart."""
+    """Public names of a module: its `__all__`, or the functions and classes that it defines, private ones apart."""
     loaded = import_module(module)
     offered = getattr(loaded, "__all__", None)
     if offered is not None:
@@ -59,7 +59,7 @@ def names_of(module: str) -> list[str]:
 
 
 def home_of(module: str, name: str) -> str:
-    """Where an offered name is explained: the module below which it is made, where that one offers it, or this one."""
+    """The module that explains a name: one above its definition that offers it too, or else `module`."""
     made_in = getattr(getattr(import_module(module), name), "__module__", None) or module
     above = [m for m in MODULES if f"{made_in}.".startswith(f"{m}.") and name in names_of(m)]
     return max(above, key=len, default=module)

@@ -18,7 +18,7 @@ def page() -> str:
 
 def _section(stage: str, settings: Any) -> str:
     rows = [_row(f, getattr(settings, f.name)) for f in fields(settings)]
-    table = ["| setting | value | unit | range | what it decides | source |", "|---|---|---|---|---|---|", *rows]
+    table = ["| setting | value | unit | range | decides | source |", "|---|---|---|---|---|---|", *rows]
     lines = [f"## {stage}", "", inspect.getdoc(settings) or "", "", *table, ""]
     return "\n".join([*lines, *_derived(settings)])
 
@@ -30,7 +30,7 @@ def _row(declared: Field[Any], value: Any) -> str:
 
 
 def _range(declared: Field[Any]) -> str:
-    """What a setting may be."""
+    """Allowed values of a setting."""
     (least, most), whole = declared.metadata["range"], isinstance(declared.default, int)
     least = max(least, 1) if whole else least
     low = f"{least:g} or more" if least else "above 0"
@@ -38,13 +38,13 @@ def _range(declared: Field[Any]) -> str:
 
 
 def _derived(settings: Any) -> list[str]:
-    """What follows from the settings of a stage."""
+    """Properties of a stage, computed from its settings."""
     properties = {name: of for name, of in vars(type(settings)).items() if isinstance(of, property)}
     rows = [
         f"| `{name}` | {_number(getattr(settings, name))} | {' '.join((of.__doc__ or '').split())} |"
         for name, of in properties.items()
     ]
-    table = ["| what follows | value | what it decides |", "|---|---|---|", *rows, ""]
+    table = ["| derived | value | decides |", "|---|---|---|", *rows, ""]
     return table if rows else []
 
 

@@ -17,7 +17,7 @@ SCORES = {
 
 
 def page(name: str) -> str:
-    """Markdown below the title and the film.  name: of the task, e.g. `Track`."""
+    """Markdown below the title and the film of a task, e.g. of `Track`."""
     return "\n".join([*_class(name), "## Scores", "", *_scores(name)])
 
 
@@ -25,7 +25,7 @@ def _class(name: str) -> Iterator[str]:
     kind = TASKS[name]
     yield from (f"Ids: `spikecam_env/{name}-v1` (64 x 64), `spikecam_env/{name}-Full-v1` (250 x 400).", "")
     yield from ("```{eval-rst}", f".. autoclass:: {kind.__module__}.{kind.__name__}", "```", "")
-    yield from ("[Tasks](../environments.md) has what they share: observation, action, reward and score.", "")
+    yield from ("[Tasks](../environments.md): observation, action, reward and score, which all tasks share.", "")
 
 
 def _scores(name: str) -> Iterator[str]:

@@ -1,1 +1,1 @@
-"""What a diagnosis says: sentences, plots, and one page of HTML."""
+"""A diagnosis in words: sentences, plots, and one page of HTML."""

@@ -1,4 +1,4 @@
-"""Evidence: what the report draws of a case, simulated under the model before and after."""
+"""Evidence: recordings that the report draws, measured and simulated under the model before and after."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from spikecam_env.sensor import SensorModel
 
 
 def evidence_for(comparison: Comparison, rounds: Sequence[Round], conclusion: Conclusion) -> Evidence:
-    """What the report draws: the tested model with the unit as it would be, and where it differs the patched one."""
+    """Twins of the tested model, with its nominal unit, and where it differs of the patched one."""
     case, tested = comparison.case, comparison.tested
     model = rounds[-1].model if rounds else comparison.model
     unit = rounds[-1].base if rounds else constrained_refit(model, case.base)
@@ -29,9 +29,14 @@ def evidence_for(comparison: Comparison, rounds: Sequence[Round], conclusion: Co
 def evidence_of(
     case: Case, before: SensorModel, base: BaseFit, after: SensorModel | None = None, after_base: BaseFit | None = None
 ) -> Evidence:
-    """What the report draws of a case: two twins of the model before, one of the patched model, fresh units of both.
+    """Two twins of the model before, one of the patched model, and fresh units of both.
 
-    base, after_base: the units to simulate under each.  after: None where nothing was added.
+    Args:
+        case: the measurement.
+        before: the tested model.
+        base: its unit.
+        after: the patched model; None where nothing was added.
+        after_base: its unit; None for `base`.
     """
     counted_anew = case.nominal_per_label != 1.0
 

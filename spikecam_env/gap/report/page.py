@@ -1,21 +1,25 @@
-"""The report of a diagnosis: one HTML file for an engineer who did not write it.
+"""The report of a diagnosis: one HTML file for an engineer who did not write it (`report.html.jinja`).
 
-From the answer to its reasons: the verdict in a sentence, what it means, the gap before and after, the evidence,
-candidates, what could not be tested, the patched model, and how to make the page again.
+The verdict comes first, in a sentence, and its meaning.  Its reasons follow: gap, evidence, statistics and candidates.
+The patched model comes last, and how to make the page again.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
-from spikecam_env.gap.report import figures, meaning, reproduce, tables
+from spikecam_env.gap.report import plots, quantities, reproduce, table_rows, words
+from spikecam_env.gap.report.exhibits import LEAST_Z, by_z, exhibits
 from spikecam_env.gap.report.panels import shape_of
-from spikecam_env.gap.report.style import STYLE
-from spikecam_env.gap.report.words import HEADINGS, WITH_REMAINDER
-from spikecam_env.gap.result import Diagnosis
-from spikecam_env.page import element, page
+from spikecam_env.gap.report.sentence import NO_BOUNDS, gap_line, heading
+from spikecam_env.gap.result import CHANCE, Diagnosis
+from spikecam_env.page import TEMPLATES, picture
 from spikecam_env.whole import write_text_whole
+
+LEAST_SHOWN = 3
+"""Exhibits that are shown where measured and model differ nowhere."""
 
 
 def write_report(diagnosis: Diagnosis, path: str | Path, campaign_command: str = "") -> None:
@@ -36,48 +40,48 @@ def write_report(diagnosis: Diagnosis, path: str | Path, campaign_command: str =
 
 
 def report(diagnosis: Diagnosis, campaign_command: str = "") -> str:
-    """The whole page.  campaign_command: what made the campaign, to be shown with the command that made the page."""
+    """The whole page; arguments as of `write_report`."""
     d = diagnosis
-    reproduced = ("reproduce", "How to reproduce this page", list(reproduce.reproduce_section(d, campaign_command)))
-    sections = [*((anchor, title, list(make(d))) for anchor, title, make in _SECTIONS), reproduced]
-    present = [(anchor, title, parts) for anchor, title, parts in sections if parts]
-    links = " · ".join(f'<a href="#{anchor}">{element("span", title)}</a>' for anchor, title, _ in present)
-    parts = [
-        f'<header class="verdict {d.verdict}">',
-        element("p", WITH_REMAINDER if d.remainder else HEADINGS[d.verdict], class_="badge"),
-        element("h1", d.sentence),
-        element("p", subject(d), class_="subject"),
-        "</header>",
-        f"<nav>{links}</nav>",
-    ]
-    for anchor, title, inside in present:
-        parts += [f'<section id="{anchor}">', element("h2", title), *inside, "</section>"]
-    return page(f"Diagnosis of {Path(d.campaign).name}", parts, STYLE)
+    used = use_of_recordings(d)
+    made = exhibits(d.evidence, d.patched.frame_rate_hz) if d.evidence else []
+    shown, folded = by_z(made, d.statistics)
+    context: dict[str, Any] = {
+        "d": d,
+        "name": Path(d.campaign).name,
+        "title": f"Diagnosis of {Path(d.campaign).name}",
+        "heading": heading(d),
+        "about": about(d),
+        "used": used,
+        "held": [name for name in (d.gap.by_recording if d.gap else ()) if used.get(name, "holdout") == "holdout"],
+        "commands": "\n".join(filter(None, (campaign_command, reproduce.command_of(d)))),
+        "bounds_command": reproduce.command_of(replace(d, with_bounds=True)) if NO_BOUNDS in d.data else "",
+        "notes": [str.__str__(note) for note in d.data],
+        "shown": shown or folded[:LEAST_SHOWN],
+        "folded": folded if shown else folded[LEAST_SHOWN:],
+        "nothing_shown": not shown,
+        "patched": any(s.after != s.before for s in d.statistics),
+        "CHANCE": CHANCE,
+        "LEAST_Z": LEAST_Z,
+        "gap_line": gap_line,
+        "picture": picture,
+    }
+    modules = {"plots": plots, "quantities": quantities, "reproduce": reproduce, "rows": table_rows, "words": words}
+    return TEMPLATES.get_template("gap/report/report.html.jinja").render(context, **modules)
 
 
-def subject(d: Diagnosis) -> str:
-    """What was compared with what, how long that took, and by which version of the code."""
+def about(d: Diagnosis) -> str:
+    """The recordings, their model, and their number."""
     said = f"Recordings of {Path(d.campaign).name} against the model {d.model_name}"
     shape = shape_of(d.evidence) if d.evidence else None
-    if d.evidence and shape:
-        shown = d.evidence.conditions
-        held = sum(c.use == "holdout" for c in shown)
-        said += (
-            f": {shape[0]} × {shape[1]} pixels at {d.patched.frame_rate_hz:g} Hz, {len(shown)} recordings, "
-            f"{held} of them held out"
-        )
-    return f"{said}. {sum(d.stages.values()):.0f} s, {reproduce.version_of_code()}."
+    if not d.evidence or not shape:
+        return said
+    number, held = len(d.evidence.conditions), sum(c.use == "holdout" for c in d.evidence.conditions)
+    return (
+        f"{said}: {shape[0]} × {shape[1]} pixels at {d.patched.frame_rate_hz:g} Hz, {number} recordings, "
+        f"{held} of them held out"
+    )
 
 
-_SECTIONS: tuple[tuple[str, str, Callable[[Diagnosis], Iterator[str]]], ...] = (
-    ("meaning", "What it means", meaning.meaning_section),
-    ("motion", "Where it moves", figures.motion_section),
-    ("gap", "The gap, before and after", figures.gap_section),
-    ("evidence", "Evidence", figures.evidence_section),
-    ("statistics", "All statistics", tables.statistics_section),
-    ("candidates", "Candidates", tables.candidates_section),
-    ("bounds", "Upper bounds", tables.bounds_section),
-    ("not-testable", "What could not be tested", tables.not_testable_section),
-    ("audit", "Notes on the data", tables.notes_section),
-    ("model", "The model", reproduce.model_section),
-)
+def use_of_recordings(d: Diagnosis) -> dict[str, str]:
+    """By the name of a recording: `fit` or `holdout`."""
+    return {c.name: c.use for c in d.evidence.conditions} if d.evidence else {}

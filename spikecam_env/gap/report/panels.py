@@ -1,11 +1,11 @@
-"""Evidence as curves: pure functions from observations to what the report draws.
+"""Evidence as curves: pure functions from observations to plots of the report.
 
 An exhibit is one way to look at recordings (rates, noise, spectrum ...), with a few panels: a measured curve, one twin
 of the model before and one after, and `sd`, the standard error of measured less before.  It comes from the scatter of
 that difference over pixels or columns, which the fixed pattern, the same on both sides, drops out of.
 
 Shares of intervals and coincidences have no such scatter, and regular spikes are far less random than independent
-ones: their sd is that of independent spikes, scaled by what two twins of one model differ by, where there are two.
+ones: their sd is that of independent spikes, scaled by the difference of two twins of one model, if there are two.
 """
 
 from __future__ import annotations
@@ -27,22 +27,23 @@ Array = NDArray[np.floating[Any]]
 
 @dataclass(frozen=True)
 class PlotPanel:
-    """One plot.  x, measured, before, sd (N,); after (N,) or None.  log: axes that are logarithmic, "", "x", "y", "xy".
-
-    xlabel, ylabel: with the unit in brackets, [1] of pure numbers.
-    labels: names of the points instead of numbers on the x axis, which then has no label.
-    """
+    """One plot: curves of N points."""
 
     title: str
     xlabel: str
+    """With the unit in brackets, [1] of pure numbers."""
     ylabel: str
+    """As `xlabel`."""
     x: Array
     measured: Array
     before: Array
     after: Array | None
     sd: Array
+    """Standard error of measured less before."""
     log: str = ""
+    """Axes that are logarithmic: "", "x", "y", "xy"."""
     labels: tuple[str, ...] = ()
+    """Names of the points instead of numbers on the x axis, which then has no label."""
 
     @property
     def z(self) -> float:
@@ -57,7 +58,7 @@ class PlotPanel:
 
 @dataclass(frozen=True)
 class PixelMaps:
-    """One picture (H, W) of every pixel, measured and simulated.  unit: of all of them."""
+    """One picture (H, W) of every pixel, measured and simulated, in one unit."""
 
     title: str
     unit: str
@@ -67,7 +68,7 @@ class PixelMaps:
 
 
 class ReportedRecording(NamedTuple):
-    """One recording: its conditions, and what was observed."""
+    """One recording: its conditions, and what it gave: measured, of twins before and after, of another twin before."""
 
     shown: Condition
     measured: ObservedRecording
@@ -94,14 +95,26 @@ def takes(evidence: Evidence, kinds: Sequence[str]) -> list[ReportedRecording]:
     ]
 
 
-def over_pixels(
-    take: ReportedRecording, of: Callable[[ObservedRecording], Array]
-) -> tuple[Array, Array, Array | None, Array]:
-    """Means over the last axis: measured, before, after, and the standard error of measured less before."""
+class Curves(NamedTuple):
+    """Values at N points (N,): measured, before, after, and the standard error of measured less before."""
+
+    measured: Array
+    before: Array
+    after: Array | None
+    sd: Array
+
+    def less_model(self, scale: Array | float) -> Curves:
+        """The same less the model before, times `scale`."""
+        after = None if self.after is None else scale * (self.after - self.before)
+        return Curves(scale * (self.measured - self.before), np.zeros(len(self.before)), after, scale * self.sd)
+
+
+def over_pixels(take: ReportedRecording, of: Callable[[ObservedRecording], Array]) -> Curves:
+    """Means over the last axis of a quantity of each recording."""
     measured, before = of(take.measured), of(take.before)
     known = np.isfinite(measured) & np.isfinite(before)
     after = of(take.after) if take.after else None
-    return (
+    return Curves(
         mean_known(measured, known),
         mean_known(before, known),
         None if after is None else mean_known(after, np.isfinite(after)),
@@ -110,13 +123,13 @@ def over_pixels(
 
 
 def mean_known(values: Array, known: NDArray[np.bool_]) -> Array:
-    """Mean over the last axis of what is known; 0 where nothing is."""
+    """Mean of known values over the last axis; 0 where none is known."""
     mean: Array = np.where(known, values, 0.0).sum(axis=-1) / np.maximum(known.sum(axis=-1), 1)
     return mean
 
 
 def error_known(values: Array, known: NDArray[np.bool_]) -> Array:
-    """Standard error of that mean."""
+    """Standard error of `mean_known`."""
     off = np.where(known, values - mean_known(values, known)[..., None], 0.0)
     count = np.maximum(known.sum(axis=-1), 1)
     error: Array = np.sqrt((off**2).sum(axis=-1)) / count
@@ -130,9 +143,9 @@ def largest(panels: Sequence[PlotPanel], number: int) -> list[PlotPanel]:
 
 
 def scaled_by_twins(sd: Array, difference: Array | None) -> Array:
-    """Standard errors times the root mean square of two twins' difference over them.
+    """Standard errors, scaled by the root mean square over them of two twins' difference.
 
-    Few points know that scale poorly: its upper 90 % limit is taken.
+    Few points determine that scale poorly: its upper 90 % limit is taken.
     """
     if difference is None:
         return sd
@@ -144,35 +157,14 @@ def scaled_by_twins(sd: Array, difference: Array | None) -> Array:
     return scaled
 
 
-def by_recording(
-    found: Sequence[ReportedRecording], of: Callable[[ObservedRecording], Array]
-) -> tuple[Array, Array, Array | None, Array]:
-    rows = [over_pixels(t, of) for t in found]
-    after = [r[2] for r in rows]
-    return (
-        np.array([r[0] for r in rows], dtype=np.float64),
-        np.array([r[1] for r in rows], dtype=np.float64),
-        None if any(a is None for a in after) else np.array(after, dtype=np.float64),
-        np.array([r[3] for r in rows], dtype=np.float64),
-    )
+def by_recording(recordings: Sequence[ReportedRecording], of: Callable[[ObservedRecording], Array]) -> Curves:
+    """A quantity of each recording, its mean over pixels."""
+    measured, before, after, sd = zip(*(over_pixels(t, of) for t in recordings), strict=True)
+    known = None if any(a is None for a in after) else np.array(after, dtype=np.float64)
+    return Curves(np.array(measured, np.float64), np.array(before, np.float64), known, np.array(sd, np.float64))
 
 
-def against_before(
-    title: str,
-    ylabel: str,
-    found: Sequence[ReportedRecording],
-    measured: Array,
-    before: Array,
-    after: Array | None,
-    sd: Array,
-    scale: Array,
-) -> PlotPanel:
-    """A quantity of each recording less the model's, times `scale`."""
-    return PlotPanel(
-        title, "", ylabel, np.arange(len(found), dtype=np.float64), scale * (measured - before), np.zeros(len(found)),
-        None if after is None else scale * (after - before), scale * sd, labels=names(found),
-    )  # fmt: skip
-
-
-def names(found: Sequence[ReportedRecording]) -> tuple[str, ...]:
-    return tuple(t.shown.name for t in found)
+def panel_by_recording(title: str, ylabel: str, recordings: Sequence[ReportedRecording], curves: Curves) -> PlotPanel:
+    """A plot with a point a recording."""
+    names = tuple(t.shown.name for t in recordings)
+    return PlotPanel(title, "", ylabel, np.arange(len(names), dtype=np.float64), *curves, labels=names)

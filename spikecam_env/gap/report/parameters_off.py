@@ -20,24 +20,27 @@ Parameters = Mapping[str, Mapping[str, float]]
 
 @dataclass(frozen=True)
 class ParameterOff:
-    """One number that is off.  name: in a sentence; parameter: of the effect, in words; unit: of measured and nominal.
-
-    ratio: measured over nominal.
-    """
+    """One number that is off."""
 
     name: str
+    """In a sentence."""
     parameter: str
+    """Of the effect, in words."""
     unit: str
+    """Of measured and nominal."""
     measured: float
     nominal: float
     ratio: float
+    """Measured over nominal."""
     meaning: str
 
 
 def parameters_off(parameters: Parameters, circuit: Circuit) -> list[ParameterOff]:
-    """Rows of `Conclusion.parameters`, the spreads of the response joined where there are several.
+    """Parameters that are off, the spreads of the response joined where there are several.
 
-    circuit: of the model, which says how much of the response a spread is.
+    Args:
+        parameters: as of `Conclusion`.
+        circuit: of the model; it turns a spread into a share of the response.
     """
     joined = [name for name in parameters if name in SPREAD_PARAMETERS["gain"]]
     if len(joined) < 2:
@@ -47,9 +50,13 @@ def parameters_off(parameters: Parameters, circuit: Circuit) -> list[ParameterOf
 
 
 def response_spread(strengths: Mapping[str, float], circuit: Circuit) -> float:
-    """Standard deviation over pixels of the response, over its mean.  strengths: of spreads, by effect's name.
+    """Standard deviation over pixels of the response, over its mean.
 
-    gain / (C V): independent relative spreads add in squares, to first order.
+    The response is gain / (C V): independent relative spreads add in squares, to first order.
+
+    Args:
+        strengths: of spreads, by the effect's name.
+        circuit: C and V.
     """
     scale = {"bias_voltage_spread": circuit.swing_V, "capacitor_spread": circuit.capacitance_fF}
     return math.sqrt(sum((value / scale.get(name, 1.0)) ** 2 for name, value in strengths.items()))

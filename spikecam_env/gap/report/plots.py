@@ -105,7 +105,7 @@ def _by_name(axis: Axes, p: PlotPanel) -> None:
 
 
 def pixel_map(values: Array, title: str, limits: tuple[float, float], unit: str) -> Figure:
-    """Every pixel (H, W) in colour, between limits; of large arrays means of several.  unit: of values."""
+    """Every pixel (H, W) in colour, between limits; of large arrays means of several pixels."""
     values = _shrunk(values)
     with mpl.rc_context(_FONTS):
         figure = Figure((3.4, 2.9))
@@ -119,7 +119,7 @@ def pixel_map(values: Array, title: str, limits: tuple[float, float], unit: str)
 
 
 def motion_map(rate: Array, moving: NDArray[np.bool_], title: str) -> Figure:
-    """A recording (H, W) in grey, what moves in it in orange; axes in pixels of the campaign."""
+    """A recording (H, W) in grey, its moving pixels in orange; axes in pixels of the campaign."""
     low, high = map_limits(rate)
     grey = np.repeat(np.clip((rate - low) / (high - low), 0.0, 1.0)[..., None], 3, axis=2)
     orange = np.array(mpl.colors.to_rgb(BEFORE))

@@ -3,18 +3,22 @@
 from __future__ import annotations
 
 import math
+from typing import Any
+
+import numpy as np
 
 from spikecam_env.gap.report.words import bare, parameter_unit
 from spikecam_env.gap.result import Bound, Estimate, NamedEffect
 
 
 def quantity(value: float, unit: str, sd: float | None = None) -> str:
-    """A value with its standard deviation and unit, to the digits that the latter leaves.
+    """A value with its standard deviation and unit, to the digits that the deviation leaves.
 
-    >>> quantity(0.0612, "relative", 0.0012)
-    '6.12 ± 0.12 %'
-    >>> quantity(1224.0, "us", 24.0)
-    '1.224 ± 0.024 ms'
+    Example:
+        >>> quantity(0.0612, "relative", 0.0012)
+        '6.12 ± 0.12 %'
+        >>> quantity(1224.0, "us", 24.0)
+        '1.224 ± 0.024 ms'
     """
     scale, unit = readable(value, unit)
     value *= scale
@@ -28,13 +32,13 @@ def quantity(value: float, unit: str, sd: float | None = None) -> str:
 
 
 def interval(estimate: Estimate, unit: str) -> str:
-    """Where a parameter is with 90 %, in the unit and to the digits of `quantity`, two of each end at least; a dash
-    where that is not known.
+    """The 90 % interval of a parameter, to the digits of `quantity`, at least two an end; a dash where none is known.
 
-    >>> interval(Estimate(0.3023, 0.0081, (0.2893, 0.3159)), "relative")
-    '28.93 … 31.59 %'
-    >>> interval(Estimate(7.2, 6.8, (1.52, 34.06)), "us")
-    '1.5 … 34.1 us'
+    Example:
+        >>> interval(Estimate(0.3023, 0.0081, (0.2893, 0.3159)), "relative")
+        '28.93 … 31.59 %'
+        >>> interval(Estimate(7.2, 6.8, (1.52, 34.06)), "us")
+        '1.5 … 34.1 us'
     """
     if estimate.interval is None:
         return "–"
@@ -57,8 +61,9 @@ def _digits(sd: float) -> int:
 def rough(value: float, unit: str) -> str:
     """A value to three digits, or whole, with its unit.
 
-    >>> rough(0.0218, "relative"), rough(31000.0, "electrons")
-    ('2.18 %', '31000 electrons')
+    Example:
+        >>> rough(0.0218, "relative"), rough(31000.0, "electrons")
+        ('2.18 %', '31000 electrons')
     """
     scale, unit = readable(value, unit)
     return f"{three_digits(value * scale)} {unit}".rstrip()
@@ -70,7 +75,7 @@ def three_digits(value: float) -> str:
 
 
 def readable(value: float, unit: str) -> tuple[float, str]:
-    """(factor, unit) that a value of a unit is stated in."""
+    """The unit that a value is stated in, and the factor to it: (factor, unit)."""
     if unit == "relative":
         return 100.0, "%"
     if unit == "us":
@@ -93,7 +98,7 @@ def plain_sizes(effect: NamedEffect) -> str:
 
 
 def at_most(bound: Bound) -> str:
-    """A bound to two digits, rounded up: no less can be stated."""
+    """A bound to two digits, rounded up: below it none is known."""
     scale, unit = readable(bound.below, bound.unit)
     value = bound.below * scale
     digit = 10.0 ** (math.floor(math.log10(value)) - 1) if value > 0 else 1.0
@@ -104,3 +109,21 @@ def bounded_parameter(bound: Bound) -> str:
     """The parameter that a bound is of, with the effect's others where it shows least."""
     others = [f"{bare(bound.name, k)} {quantity(v, parameter_unit(bound.name, k))}" for k, v in bound.at.items()]
     return bare(bound.name, bound.parameter) + (f" ({', '.join(others)})" if others else "")
+
+
+def number(value: Any) -> str:
+    """Four digits; large ones whole, by thousands."""
+    if isinstance(value, (float, np.floating)):
+        known = float(value)
+        return f"{known:.4g}" if abs(known) < 1e4 else f"{known:,.0f}".replace(",", "\u202f")
+    return "–" if value is None else str(value)
+
+
+def signed(z: float) -> str:
+    """A deviate with its sign."""
+    return f"{z:+.1f}".replace("-", "−")
+
+
+def percent(share: float) -> str:
+    """A share in per cent."""
+    return f"{100 * share:.0f} %" if share >= 0.01 else f"{100 * share:.1g} %"

@@ -1,36 +1,36 @@
-"""What is found, in a sentence for each verdict, and in lines beside it."""
+"""A verdict in a sentence, and the lines beside it."""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 
-from spikecam_env.gap.report.cells import percent
 from spikecam_env.gap.report.parameters_off import parameters_off
-from spikecam_env.gap.report.quantities import plain_sizes, rough, three_digits
+from spikecam_env.gap.report.quantities import percent, plain_sizes, rough, three_digits
 from spikecam_env.gap.report.words import human, listed
-from spikecam_env.gap.result import BOUNDED_VERDICTS, CHANCE, Conclusion, Gap, Remainder
+from spikecam_env.gap.result import BOUNDED_VERDICTS, CHANCE, Conclusion, Diagnosis, Gap, Remainder
 from spikecam_env.gap.twins.budget import Budget
 from spikecam_env.gap.verdict.notes import gap_is_fitted
 
 
-def sentence(found: Conclusion, model_name: str) -> str:
+def sentence(conclusion: Conclusion, model_name: str) -> str:
     """The verdict in one sentence; in two, where beside effects parameters are off."""
-    said = _SENTENCES[found.verdict](found, model_name)
-    if found.verdict in ("named", "class") and found.parameters:
-        said += f" Parameters of the model {model_name} are off as well: {all_off(found)}."
+    said = VERDICTS_IN_WORDS[conclusion.verdict][1](conclusion, model_name)
+    if conclusion.verdict in ("named", "class") and conclusion.parameters:
+        said += f" Parameters of the model {model_name} are off as well: {all_off(conclusion)}."
     return said
 
 
-def none_sentence(found: Conclusion, model_name: str) -> str:
+def none_sentence(conclusion: Conclusion, model_name: str) -> str:
     """Nothing is off."""
     return f"No gap: these recordings and the model {model_name} agree to within the noise."
 
 
-def named_sentence(found: Conclusion, model_name: str) -> str:
+def named_sentence(conclusion: Conclusion, model_name: str) -> str:
     """Effects with their sizes."""
-    named = [f"{human(e.name)} ({plain_sizes(e)})" if e.parameters else human(e.name) for e in found.effects]
-    said = f"Your camera has {listed(named, 'and')}{removed_phrase(found, 'it' if len(named) == 1 else 'them')}."
-    return f"{said} {remainder_sentence(found.remainder, len(named))}" if found.remainder else said
+    named = [f"{human(e.name)} ({plain_sizes(e)})" if e.parameters else human(e.name) for e in conclusion.effects]
+    said = f"Your camera has {listed(named, 'and')}{removed_phrase(conclusion, 'it' if len(named) == 1 else 'them')}."
+    return f"{said} {remainder_sentence(conclusion.remainder, len(named))}" if conclusion.remainder else said
 
 
 def remainder_sentence(left: Remainder, names: int) -> str:
@@ -43,19 +43,19 @@ def remainder_sentence(left: Remainder, names: int) -> str:
     )
 
 
-def class_sentence(found: Conclusion, model_name: str) -> str:
+def class_sentence(conclusion: Conclusion, model_name: str) -> str:
     """Candidates that are tied, beside effects that are not."""
-    members = [human(str(name)) for name in (found.class_ or {}).get("members", ())]
-    beside = [human(e.name) for e in found.effects if human(e.name) not in members]
+    members = [human(str(name)) for name in (conclusion.class_ or {}).get("members", ())]
+    beside = [human(e.name) for e in conclusion.effects if human(e.name) not in members]
     said = listed([*beside, listed(members, "or")], "and")
-    removed = removed_phrase(found, "them" if beside else "either")
+    removed = removed_phrase(conclusion, "them" if beside else "either")
     return f"Your camera has {said}: these recordings do not show which{removed}."
 
 
-def unknown_sentence(found: Conclusion, model_name: str) -> str:
-    """A gap that no candidate closes; where a second effect was not looked for, no single one."""
-    patch = removed_phrase(found, "an empirical patch")
-    about = found.unknown or {}
+def unknown_sentence(conclusion: Conclusion, model_name: str) -> str:
+    """A gap that no candidate closes, or no single one where a second effect was not searched for."""
+    patch = removed_phrase(conclusion, "an empirical patch")
+    about = conclusion.unknown or {}
     if "not_looked_for" not in about:
         return f"Your camera does something that no candidate explains{patch}."
     best = f"; {human(about['best_candidate'])} comes nearest" if about["best_candidate"] else ""
@@ -65,45 +65,51 @@ def unknown_sentence(found: Conclusion, model_name: str) -> str:
     )
 
 
-def parameter_sentence(found: Conclusion, model_name: str) -> str:
+def parameter_sentence(conclusion: Conclusion, model_name: str) -> str:
     """Effects of the model whose strength is off."""
-    return f"No effect is missing, but parameters of the model {model_name} are off: {all_off(found)}."
+    return f"No effect is missing, but parameters of the model {model_name} are off: {all_off(conclusion)}."
 
 
-def data_sentence(found: Conclusion, model_name: str) -> str:
+def data_sentence(conclusion: Conclusion, model_name: str) -> str:
     """The first contradiction."""
-    said = found.data[0].rstrip(".") if found.data else "see the notes"
+    said = conclusion.data[0].rstrip(".") if conclusion.data else "see the notes"
     return f"The recordings contradict their own labels: {said}."
 
 
-_SENTENCES = {
-    "none": none_sentence,
-    "named": named_sentence,
-    "class": class_sentence,
-    "unknown": unknown_sentence,
-    "parameter": parameter_sentence,
-    "data": data_sentence,
+VERDICTS_IN_WORDS: dict[str, tuple[str, Callable[[Conclusion, str], str]]] = {
+    "none": ("No gap found", none_sentence),
+    "named": ("Effect named", named_sentence),
+    "class": ("One of several effects", class_sentence),
+    "unknown": ("Effect unknown", unknown_sentence),
+    "parameter": ("A parameter is off", parameter_sentence),
+    "data": ("The data contradict themselves", data_sentence),
 }
+"""Of each verdict the heading, and the function that makes its sentence."""
 
 
-def all_off(found: Conclusion) -> str:
+def heading(d: Diagnosis) -> str:
+    """The verdict above its sentence."""
+    return "Effect named, with a remainder" if d.remainder else VERDICTS_IN_WORDS[d.verdict][0]
+
+
+def all_off(conclusion: Conclusion) -> str:
     """Strengths as measured, beside those of the model."""
-    rows = parameters_off(found.parameters, found.patched.circuit)
+    rows = parameters_off(conclusion.parameters, conclusion.patched.circuit)
     return listed([f"{r.name} is {rough(r.measured, r.unit)}, not {rough(r.nominal, r.unit)}" for r in rows], "and")
 
 
-def removed_phrase(found: Conclusion, what: str) -> str:
-    """How much of the gap goes with what was added; empty where nothing does."""
-    gap = found.gap
+def removed_phrase(conclusion: Conclusion, what: str) -> str:
+    """The share of the gap that an addition removes; empty where it removes none."""
+    gap = conclusion.gap
     if gap is None or not math.isfinite(gap.removed) or gap.removed <= 0:
         return ""
-    fitted = gap_is_fitted(found.data)
+    fitted = gap_is_fitted(conclusion.data)
     which = "the held-out recordings, which were fitted too" if fitted else "recordings that were not used"
     return f"; adding {what} removes {100 * min(gap.removed, 1.0):.0f} % of the gap on {which}"
 
 
 def gap_line(gap: Gap) -> str:
-    """What a model's patch did to the gap."""
+    """The gap before and after the patch of the model."""
     off = f"the mean square distance of statistics from the model, in noise, is {three_digits(gap.before)}"
     halves = "" if gap.floor == CHANCE else f", and two halves of the measurement differ by {gap.floor:.3g}"
     chance = f"{CHANCE:g} is chance{halves}"
@@ -130,7 +136,7 @@ NO_BOUNDS = (
     "Upper bounds of the effects that were not found are not simulated by default: `spikecam diagnose --bounds`, or "
     "diagnose(..., bounds=True), adds them. They take some 200 campaigns."
 )
-"""Why a diagnosis that found no effect has no bounds, and what adds them."""
+"""Why a diagnosis without effects has no bounds, and the option that adds them."""
 
 
 BOUNDS_OF_MAPS = "Recordings that are rates only have no upper bounds: these need spikes."
@@ -138,7 +144,7 @@ BOUNDS_OF_MAPS = "Recordings that are rates only have no upper bounds: these nee
 
 
 def unfinished(effort: Budget) -> list[str]:
-    """A note on what was not begun because enough had been simulated; none where nothing was left out."""
+    """A note on the parts that were left out to stay within the budget; none where nothing was."""
     left_out = listed([human(what) for what in effort.left_out], "and")
     wider = " Intervals are wider for it." if any("finer" in what for what in effort.left_out) else ""
     return [f"Skipped to stay within --effort: {left_out}. A larger --effort includes them.{wider}"] if left_out else []

@@ -6,24 +6,12 @@ import dataclasses
 import importlib
 import inspect
 from collections.abc import Sequence
+from typing import NamedTuple
 
 from spikecam_env.errors import InputError
 from spikecam_env.gap import statistics
 from spikecam_env.sensor import CATALOGUE
 from spikecam_env.sensor.effect_sheet import Sheet
-
-HEADINGS = {
-    "none": "No gap found",
-    "named": "Effect named",
-    "class": "One of several effects",
-    "unknown": "Effect unknown",
-    "parameter": "A parameter is off",
-    "data": "The data contradict themselves",
-}
-"""Verdicts as a heading says them."""
-
-WITH_REMAINDER = "Effect named, with a remainder"
-"""The heading where what is named leaves something beyond chance."""
 
 
 def human(name: str) -> str:
@@ -47,29 +35,35 @@ def parameter_unit(effect: str, parameter: str) -> str:
 
 
 def meaning_of(effect: str, parameter: str) -> str:
-    """What a parameter is, in the catalogue's words."""
+    """The meaning of a parameter, in the catalogue's words."""
     for field in dataclasses.fields(CATALOGUE[effect]) if effect in CATALOGUE else ():
         if field.name == parameter:
             return str(field.metadata["doc"])
     return ""
 
 
-def sheet(effect: str) -> Sheet | None:
-    """What the catalogue says of an effect; None where it does not hold it."""
+class EffectInWords(NamedTuple):
+    """An effect as the catalogue describes it; of an effect that it does not hold, the name."""
+
+    title: str
+    said: str = ""
+    law: str = ""
+    seen_in: str = ""
+
+
+def described(effect: str) -> EffectInWords:
+    """The catalogue's words on an effect."""
     try:
-        return Sheet.of(CATALOGUE[effect]) if effect in CATALOGUE else None
-    except InputError:
-        return None
-
-
-def equation_of(effect: str) -> str:
-    """The effect's equation, as its file has it."""
-    found = sheet(effect)
-    return inspect.cleandoc(found.law) if found else ""
+        sheet = Sheet.of(CATALOGUE[effect])
+    except (KeyError, InputError):
+        return EffectInWords(human(effect).capitalize())
+    title, _, said = sheet.summary.partition(": ")
+    law = inspect.cleandoc(sheet.law)
+    return EffectInWords(title, said[:1].upper() + said[1:], law, sheet.sections.get("Seen in", ""))
 
 
 def group_meaning(group: str) -> str:
-    """What a group of statistics looks at, as its file says; empty where the bank has none of this name."""
+    """The subject of a group of statistics, as its file says; empty where the bank has none of this name."""
     try:
         module = importlib.import_module(f"{statistics.__name__}.{group}")
     except ModuleNotFoundError:

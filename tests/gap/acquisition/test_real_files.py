@@ -13,8 +13,8 @@ from spikecam_env.gap import Dark, Flat, Label, Step, import_campaign, labels_fr
 from spikecam_env.gap.acquisition import real_files
 from spikecam_env.sensor import Keyframes
 from spikecam_env.streams import SpikeWriter, save_npz, save_vidar_dat
+from tools.real_recordings import REAL
 
-REAL = Path(__file__).parents[3].parent / "shared" / "data" / "real"
 real = pytest.mark.skipif(not REAL.is_dir(), reason=f"the real recordings are not at {REAL}")
 
 SHAPE = (10, 16)

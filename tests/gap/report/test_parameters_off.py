@@ -1,4 +1,4 @@
-"""Parameters that are off: what recordings tell as one number is one row."""
+"""Parameters that are off: numbers that recordings show only together are one row."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What is found, in a sentence."""
+"""The verdict in a sentence."""
 
 from __future__ import annotations
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from spikecam_env.gap.compare.prediction import Null
-from spikecam_env.gap.report.meaning import _STRUCTURE
+from spikecam_env.gap.report.table_rows import STRUCTURE
 from spikecam_env.gap.statistics import StatisticKey
 from spikecam_env.gap.verdict import structure as module
 from spikecam_env.gap.verdict.structure import level_exponent, structure
@@ -58,4 +58,4 @@ def test_what_many_pixels_have_in_common_has_its_share_of_the_deviance(rows, ext
     found = structure(case, null, off)
     assert found["extent"] == extent
     assert {"light", "level_exponent", "extent", "history", "neighbours", "clock", "where", "when"} <= set(found)
-    assert set(found) - {"worst_group", "groups"} <= set(_STRUCTURE), "what has no words on the page"
+    assert set(found) - {"worst_group", "groups"} <= set(STRUCTURE), "what has no words on the page"

@@ -27,9 +27,10 @@ LEAST_Z = 4.0
 
 @dataclass(frozen=True)
 class Exhibit:
-    """One way to look.  name: of the group of statistics that it shows.  panels, maps: what is drawn of it."""
+    """One way to look."""
 
     name: str
+    """Of the group of statistics that it shows."""
     title: str
     caption: str
     panels: tuple[PlotPanel, ...]
@@ -42,7 +43,7 @@ class Exhibit:
 
 
 def exhibits(evidence: Evidence, frame_rate_hz: float) -> list[Exhibit]:
-    """All that these recordings can show; those without a panel are left out."""
+    """The exhibits of these recordings that have a panel or a map."""
     made = []
     for module in (rates, noise, intervals, drift, spectrum, rows, neighbours, clock, step, moving, pattern):
         panels = tuple(module.panels(evidence, frame_rate_hz))

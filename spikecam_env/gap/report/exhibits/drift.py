@@ -20,9 +20,9 @@ def panels(evidence: Evidence, frame_rate_hz: float) -> Iterator[PlotPanel]:
     for t in takes(evidence, STEADY):
         if t.before.blocks.sum() < 100:
             continue
-        measured, before, after, sd = over_pixels(t, lambda o: o.blocks / max(o.blocks.mean(), 1e-9))
-        x = (np.arange(len(measured)) + 0.5) * (t.measured.frames / len(measured)) * 1e3 / frame_rate_hz
-        made.append(PlotPanel(f"Rate through {t.shown.name}", "time [ms]", "rate over its mean, less 1 [%]", x,
-                            100 * (measured - before), np.zeros(x.size),
-                            None if after is None else 100 * (after - before), 100 * sd))  # fmt: skip
+        curves = over_pixels(t, lambda o: o.blocks / max(o.blocks.mean(), 1e-9))
+        parts = len(curves.measured)
+        x = (np.arange(parts) + 0.5) * (t.measured.frames / parts) * 1e3 / frame_rate_hz
+        title, ylabel = f"Rate through {t.shown.name}", "rate over its mean, less 1 [%]"
+        made.append(PlotPanel(title, "time [ms]", ylabel, x, *curves.less_model(100)))
     yield from largest(made, 2)

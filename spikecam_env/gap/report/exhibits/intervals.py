@@ -7,7 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from spikecam_env.gap.observe.conditions import STEADY
-from spikecam_env.gap.report.panels import PlotPanel, largest, scaled_by_twins, takes
+from spikecam_env.gap.report.panels import Curves, PlotPanel, largest, scaled_by_twins, takes
 from spikecam_env.gap.result import Evidence
 
 TITLE = "Lengths of intervals"
@@ -28,9 +28,7 @@ def panels(evidence: Evidence, frame_rate_hz: float) -> Iterator[PlotPanel]:
         after = t.after.lengths[shown] / total[2] if t.after else None
         sd = np.sqrt(np.maximum(measured, 1 / total[0]) / total[0] + np.maximum(before, 1 / total[1]) / total[1])
         sd = scaled_by_twins(sd, t.again.lengths[shown] / max(t.again.lengths.sum(), 1) - before if t.again else None)
-        made.append(PlotPanel(
-            f"Intervals by length, {t.shown.name}", "length [frames]", "share, less the model's [%]",
-            shown + 1.0, 100 * (measured - before), np.zeros(shown.size),
-            None if after is None else 100 * (after - before), 100 * sd,
-        ))  # fmt: skip
+        title, ylabel = f"Intervals by length, {t.shown.name}", "share, less the model's [%]"
+        curves = Curves(measured, before, after, sd).less_model(100)
+        made.append(PlotPanel(title, "length [frames]", ylabel, shown + 1.0, *curves))
     yield from largest(made, 3)

@@ -1,4 +1,4 @@
-"""Moving light: where spikes are too many or too few, by what the light does there."""
+"""Moving light: too many or too few spikes, by the change of the light."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ def panels(evidence: Evidence, frame_rate_hz: float) -> Iterator[PlotPanel]:
 
 
 def light_features(light: Array, shape: tuple[int, int]) -> dict[str, Array]:
-    """What of a film of light (bins, P) a pixel may notice, (bins, P) each, relative to the mean light."""
+    """Changes of a film of light (bins, P) that a pixel may notice, (bins, P) each, relative to the mean light."""
     bins = len(light)
     film = (light / max(float(light.mean()), 1e-12)).reshape(bins, *shape)
     change = np.gradient(film, axis=0)

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from spikecam_env.gap.observe.conditions import STEADY
-from spikecam_env.gap.report.panels import PlotPanel, largest, scaled_by_twins, takes
+from spikecam_env.gap.report.panels import Curves, PlotPanel, largest, scaled_by_twins, takes
 from spikecam_env.gap.result import Evidence
 
 TITLE = "Neighbours"
@@ -29,10 +29,7 @@ def panels(evidence: Evidence, frame_rate_hz: float) -> Iterator[PlotPanel]:
         again = t.again.coincidences.T.reshape(-1) if t.again else None
         # Every pair is counted both ways round.
         sd = scaled_by_twins(np.sqrt(2 / measured + 2 / before), None if again is None else again / before - 1)
-        made.append(PlotPanel(
-            f"Coincidences of neighbours, {t.shown.name}", "", "over the model's, less 1 [%]",
-            np.arange(len(labels), dtype=np.float64), 100 * (measured / before - 1), np.zeros(len(labels)),
-            None if after is None else 100 * (after / before - 1), 100 * sd,
-            labels=labels,
-        ))  # fmt: skip
+        title, x = f"Coincidences of neighbours, {t.shown.name}", np.arange(len(labels), dtype=np.float64)
+        curves = Curves(measured / before, np.ones(len(labels)), None if after is None else after / before, sd)
+        made.append(PlotPanel(title, "", "over the model's, less 1 [%]", x, *curves.less_model(100), labels=labels))
     yield from largest(made, 2)

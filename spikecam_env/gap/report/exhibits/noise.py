@@ -9,7 +9,7 @@ import numpy as np
 from spikecam_env.calibration.jitter import Jitter, fit_jitter
 from spikecam_env.gap.observe.conditions import STEADY
 from spikecam_env.gap.observe.observation import DIFFERENCES, ObservedRecording
-from spikecam_env.gap.report.panels import PlotPanel, ReportedRecording, against_before, by_recording, names, takes
+from spikecam_env.gap.report.panels import PlotPanel, ReportedRecording, by_recording, panel_by_recording, takes
 from spikecam_env.gap.result import Evidence
 
 TITLE = "Temporal noise"
@@ -32,18 +32,15 @@ def panels(evidence: Evidence, frame_rate_hz: float) -> Iterator[PlotPanel]:
         yield levels
     enough = [t for t in static if np.isfinite(t.measured.variance - t.before.variance).sum() > 1]
     if enough:
-        measured, before, after, sd = by_recording(enough, lambda o: o.variance)
-        yield against_before("Variance of intervals", "variance over the model's, less 1 [%]", enough, measured,
-                              before, after, sd, 100 / before)  # fmt: skip
-        measured, before, after, sd = by_recording(enough, lambda o: o.covariance / np.nanmean(o.variance))
-        yield PlotPanel(
-            "Correlation of successive intervals", "", "lag-1 correlation [1]",
-            np.arange(len(enough), dtype=np.float64), measured, before, after, sd, labels=names(enough),
-        )  # fmt: skip
+        variance = by_recording(enough, lambda o: o.variance)
+        off = variance.less_model(100 / variance.before)
+        yield panel_by_recording("Variance of intervals", "variance over the model's, less 1 [%]", enough, off)
+        correlation = by_recording(enough, lambda o: o.covariance / np.nanmean(o.variance))
+        yield panel_by_recording("Correlation of successive intervals", "lag-1 correlation [1]", enough, correlation)
 
 
 def _noise_by_step(static: Sequence[ReportedRecording]) -> PlotPanel | None:
-    """(A_k less what reading in frames adds) / 2 k T^2 over k, pooled over pixels and recordings."""
+    """(A_k less the noise of reading in frames) / 2 k T^2 over k, pooled over pixels and recordings."""
     fits = [_jitter([getattr(t, side) for t in static]) for side in ("measured", "before", "after")]
     measured, before, after = fits
     if measured is None or before is None or not np.array_equal(measured.steps, before.steps):

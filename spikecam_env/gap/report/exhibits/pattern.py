@@ -1,6 +1,6 @@
 """The fixed pattern: maps, histograms, and profiles by row and column, beside those of fresh units of the models.
 
-A twin has the measured unit's own pattern wherever its model has one, so that only a fresh unit shows what to expect.
+A twin has the measured unit's own pattern wherever its model has one: only a fresh unit shows the pattern to expect.
 """
 
 from __future__ import annotations
@@ -9,7 +9,7 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from spikecam_env.gap.report.panels import Array, PixelMaps, PlotPanel, shape_of
+from spikecam_env.gap.report.panels import Array, Curves, PixelMaps, PlotPanel, shape_of
 from spikecam_env.gap.result import Evidence
 
 TITLE = "Fixed pattern"
@@ -41,16 +41,10 @@ def panels(evidence: Evidence, frame_rate_hz: float) -> Iterator[PlotPanel]:
         measured, before, after = relative
         assert measured is not None and before is not None
         sd = (measured - before).std(axis=axis) / np.sqrt(shape[axis])
-        yield PlotPanel(
-            f"Response by {name}",
-            f"{name} [pixels]",
-            "off the mean [%]",
-            np.arange(sd.size, dtype=np.float64),
-            measured.mean(axis=axis),
-            before.mean(axis=axis),
-            None if after is None else after.mean(axis=axis),
-            sd,
-        )
+        after_mean = None if after is None else after.mean(axis=axis)
+        curves = Curves(measured.mean(axis=axis), before.mean(axis=axis), after_mean, sd)
+        x = np.arange(sd.size, dtype=np.float64)
+        yield PlotPanel(f"Response by {name}", f"{name} [pixels]", "off the mean [%]", x, *curves)
 
 
 def maps(evidence: Evidence) -> Iterator[PixelMaps]:

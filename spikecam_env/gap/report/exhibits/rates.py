@@ -7,7 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from spikecam_env.gap.observe.conditions import STEADY
-from spikecam_env.gap.report.panels import PlotPanel, against_before, by_recording, error_known, mean_known, takes
+from spikecam_env.gap.report.panels import PlotPanel, by_recording, error_known, mean_known, panel_by_recording, takes
 from spikecam_env.gap.result import Evidence
 
 TITLE = "Rates and levels"
@@ -37,10 +37,8 @@ def panels(evidence: Evidence, frame_rate_hz: float) -> Iterator[PlotPanel]:
             None if after is None else mean_known(after, np.isfinite(after))[usable],
             error_known(measured - before, known)[usable], log="x",
         )  # fmt: skip
-    found = takes(evidence, (*STEADY, "step", "moving"))
-    found = [t for t in found if t.before.rate.mean() > 0]
-    if found:
-        measured, before, after, sd = by_recording(found, lambda o: o.rate)
-        scale = 100 / before
-        yield against_before("Rate of the array, recording by recording", "rate over the model's, less 1 [%]", found,
-                              measured, before, after, sd, scale)  # fmt: skip
+    shown = [t for t in takes(evidence, (*STEADY, "step", "moving")) if t.before.rate.mean() > 0]
+    if shown:
+        rates = by_recording(shown, lambda o: o.rate)
+        title, ylabel = "Rate of the array, recording by recording", "rate over the model's, less 1 [%]"
+        yield panel_by_recording(title, ylabel, shown, rates.less_model(100 / rates.before))

@@ -8,7 +8,7 @@ from itertools import pairwise
 import numpy as np
 
 from spikecam_env.gap.observe.observation import ObservedRecording
-from spikecam_env.gap.report.panels import Array, PlotPanel, takes
+from spikecam_env.gap.report.panels import Array, Curves, PlotPanel, takes
 from spikecam_env.gap.result import Evidence
 from spikecam_env.gap.statistics.step import edges_of, uniform_light
 
@@ -20,7 +20,7 @@ _BIN, _BEFORE, _AFTER = 8, 64, 320
 
 
 def panels(evidence: Evidence, frame_rate_hz: float) -> Iterator[PlotPanel]:
-    """The array's rate around rises and falls of uniform light, and what it lacks of the model's."""
+    """The array's rate around rises and falls of uniform light, and the same less the model's."""
     for t in takes(evidence, ("step",)):
         edges = edges_of(uniform_light(t.shown))
         for name, sign in (("rise", 1), ("fall", -1)):
@@ -33,24 +33,14 @@ def panels(evidence: Evidence, frame_rate_hz: float) -> Iterator[PlotPanel]:
             after = around(t.after, mine, window)[1].mean(axis=1) if t.after else None
             ms = x * 1e3 / frame_rate_hz
             sd = (measured - before).std(axis=1) / np.sqrt(measured.shape[1])
-            rates = PlotPanel(
-                f"Rate around a {name} ({t.shown.name})",
-                f"time from the {name} [ms]",
-                "rate [spikes/frame]",
-                ms,
-                measured.mean(axis=1),
-                before.mean(axis=1),
-                after,
-                sd,
-            )
+            rates = Curves(measured.mean(axis=1), before.mean(axis=1), after, sd)
             height = abs(rates.before[x > 0].mean() - rates.before[x < 0].mean())
-            scale = 100 / max(height, 1e-9)
-            yield rates
+            off = rates.less_model(100 / max(height, 1e-9))
+            xlabel = f"time from the {name} [ms]"
+            yield PlotPanel(f"Rate around a {name} ({t.shown.name})", xlabel, "rate [spikes/frame]", ms, *rates)
             yield PlotPanel(
-                f"Residual after a {name} ({t.shown.name})", f"time from the {name} [ms]",
-                "less the model's [% of step]", ms, scale * (rates.measured - rates.before), np.zeros(x.size),
-                None if after is None else scale * (after - rates.before), scale * sd,
-            )  # fmt: skip
+                f"Residual after a {name} ({t.shown.name})", xlabel, "less the model's [% of step]", ms, *off
+            )
 
 
 def free_window(edges: Sequence[int], frames: int) -> tuple[int, int]:
@@ -60,9 +50,15 @@ def free_window(edges: Sequence[int], frames: int) -> tuple[int, int]:
 
 
 def around(observation: ObservedRecording, edges: Sequence[int], window: tuple[int, int]) -> tuple[Array, Array]:
-    """Middles of bins from an edge on [frames] and, mean over edges, spikes a frame of a pixel (bins, W columns).
+    """The array's rate around edges.
 
-    window: frames before and after an edge.
+    Args:
+        observation: of the recording.
+        edges: frames of the edges.
+        window: frames before and after an edge.
+
+    Returns:
+        Middles of bins from an edge on [frames], and spikes a frame of a pixel (bins, columns), mean over edges.
     """
     bins = np.arange(-window[0], window[1], _BIN)
     total = np.zeros((bins.size, observation.shape[1]))
