@@ -9,12 +9,12 @@ from importlib.metadata import version
 from pathlib import Path
 
 import h5py
-import imageio.v2 as imageio
 import numpy as np
 import pytest
 
 from spikecam_env.cli.main import COMMANDS, run
 from spikecam_env.streams import load_vidar_dat, read_recording
+from tests.films import film_in, picture_in
 
 SMALL = ("--size", "64", "96")
 
@@ -72,9 +72,8 @@ def test_the_demo_makes_a_film_a_picture_and_its_figures(tmp_path: Path, capsys)
     assert "clean twin" in printed and "x real time" in printed
     figures = json.loads((tmp_path / "demo.json").read_text())
     assert [row["stream"] for row in figures["table"]] == ["noisy", "paper", "best", "clean twin"]
-    film = imageio.get_reader(tmp_path / "demo.mp4")
-    assert film.count_frames() == 500 // 25 - 6
-    assert imageio.imread(tmp_path / "demo.png").shape[2] == 3
+    assert len(film_in(tmp_path / "demo.mp4")) == 500 // 25 - 6
+    assert picture_in(tmp_path / "demo.png").shape[2] == 3
     assert f"wrote {tmp_path / 'demo.mp4'}" in printed
 
 
@@ -82,7 +81,7 @@ def test_a_quick_demo_makes_a_picture_alone(tmp_path: Path, capsys) -> None:
     assert spikecam("demo", "--quick", "--out", tmp_path, *SMALL) == 0
     assert f"wrote {tmp_path / 'demo.png'}" in capsys.readouterr().out
     assert [path.name for path in tmp_path.iterdir()] == ["demo.png"]
-    noisy, denoised, truth = np.array_split(imageio.imread(tmp_path / "demo.png")[20:160, :, 0].astype(float), 3, 1)
+    noisy, denoised, truth = np.array_split(picture_in(tmp_path / "demo.png")[20:160, :, 0].astype(float), 3, 1)
     errors = [float(np.mean(np.abs(picture[:, 20:280] - truth[:, 20:280]))) for picture in (noisy, denoised)]
     print(f"mean difference from the true light: noisy {errors[0]:.1f}, denoised {errors[1]:.1f} of 255")
     assert errors[1] < 0.8 * errors[0]

@@ -10,7 +10,6 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-import imageio.v2 as imageio
 import numpy as np
 import pytest
 
@@ -21,6 +20,7 @@ from spikecam_env.cli.main import run
 from spikecam_env.cli.panels import MARGIN, display
 from spikecam_env.sensor import SpikeSensor
 from spikecam_env.streams import pack_frames, save_vidar_dat
+from tests.films import film_in
 
 SHAPE = (24, 40)
 SIZE = ("--height", 24, "--width", 40)
@@ -93,7 +93,7 @@ def test_a_film_is_what_a_window_would_show(recording: Path, capsys, tmp_path: P
     assert spikecam("live", recording, "--loop", "--seconds", 1.5, "--speed", 0.02, "--film", film) == 0
     printed = capsys.readouterr().out
     assert printed.endswith(f"wrote {film}\n")
-    pictures = [picture[..., 0].astype(float) for picture in imageio.get_reader(film)]
+    pictures = [picture[..., 0].astype(float) for picture in film_in(film)]
     assert 0.5 * 30 <= len(pictures) <= (figures(printed)["seconds"] + 0.2) * 30
     rows, columns = SHAPE[0] * SCALE, SHAPE[1] * SCALE
     noisy, clean = (pictures[-1][MARGIN : MARGIN + rows, left:][:, :columns] for left in (MARGIN, 2 * MARGIN + columns))
@@ -181,7 +181,7 @@ def test_in_a_window_escape_ends_an_endless_stream(recording: Path, monkeypatch:
             return ["escape"] if len(shown) > 3 else []
 
     monkeypatch.setattr("spikecam_env.cli.live.window.has_display", lambda: True)
-    monkeypatch.setattr("spikecam_env.cli.live.window.Window", Window)
+    monkeypatch.setattr("spikecam_env.cli.live.window.DisplayWindow", Window)
     assert spikecam("live", recording, "--loop", "--speed", 0.05) == 0
     assert len(shown) == 4 and len({picture.shape for picture in shown}) == 1
     assert figures(capsys.readouterr().out)["pictures"] >= 4

@@ -9,7 +9,6 @@ from types import SimpleNamespace
 from typing import Any
 
 import gymnasium
-import imageio.v2 as imageio
 import numpy as np
 import pytest
 
@@ -22,6 +21,7 @@ from spikecam_env.cli.live.players import Player, player, steering
 from spikecam_env.cli.live.screen import AIM, TARGET, Screen
 from spikecam_env.cli.main import run
 from spikecam_env.envs.score import BASELINES, play
+from tests.films import film_in
 
 
 def spikecam(*args: object) -> int:
@@ -41,7 +41,7 @@ def test_without_a_display_the_oracle_is_filmed_and_the_path_printed(tmp_path: P
     assert "wrote Catch-v1.mp4: oracle at Catch-v1, 40 times slower than life" in printed
     assert "score 1.000" in printed
     cells = dict(zip(("seed", "steps", "time"), printed.splitlines()[-2].split(), strict=False))
-    film = [picture.copy() for picture in imageio.get_reader(tmp_path / "Catch-v1.mp4")]
+    film = film_in(tmp_path / "Catch-v1.mp4")
     assert len(film) == round(float(cells["time"]) * 40 * 25 / 1000) + 25
     assert film[0].shape[1] > 2 * 320 and not np.array_equal(film[0], film[9])
 
