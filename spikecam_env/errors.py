@@ -22,7 +22,7 @@ class InputError(ValueError):
     >>> Circuit(reset_V=50.0)
     Traceback (most recent call last):
         ...
-    spikecam_env.errors.InputError: circuit.reset_V = 50.0 is outside -20 .. 20 V
+    spikecam_env.errors.InputError: circuit.reset_V = 50.0; it must be a number from -20 to 20 V
     """
 
 

@@ -29,9 +29,24 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
-from spikecam_env.checked import LARGEST_COUNT, LARGEST_SEED, MOST_PIXELS, checked_memory, each_once
+from spikecam_env.checked import checked_memory, each_once
 from spikecam_env.errors import InputError, shown, unknown_name
 from spikecam_env.locks import warn_without_locks
+from spikecam_env.numbers import (
+    Count as Count,
+)
+from spikecam_env.numbers import (
+    Positive as Positive,
+)
+from spikecam_env.numbers import (
+    Seed as Seed,
+)
+from spikecam_env.numbers import (
+    Side as Side,
+)
+from spikecam_env.numbers import (
+    Whole as Whole,
+)
 
 if sys.version_info >= (3, 11):
     import tomllib
@@ -41,16 +56,6 @@ else:
 MOST_TEXT_BYTES = 64 << 20
 """Largest JSON or TOML file that is read; the largest this package writes take a few MB."""
 
-Count = Annotated[int, Field(ge=1, le=LARGEST_COUNT)]
-"""A whole number, 1 or more."""
-Whole = Annotated[int, Field(ge=0, le=LARGEST_COUNT)]
-"""A whole number, 0 or more."""
-Seed = Annotated[int, Field(ge=0, le=LARGEST_SEED)]
-"""A seed of random numbers."""
-Side = Annotated[int, Field(ge=1, le=MOST_PIXELS)]
-"""Rows or columns of a picture."""
-Positive = Annotated[float, Field(gt=0)]
-"""A finite number above 0."""
 Name = Annotated[str, Field(min_length=1, max_length=255)]
 """Text that is not empty."""
 
@@ -369,7 +374,7 @@ def _as_input_error(error: ValidationError, kind: type[BaseModel], where: str) -
         allowed = first["ctx"]["expected"].replace("'", "").replace(" or ", ", ")
         return InputError(f"{where}: {place} = {value}; choose one of {allowed}")
     message = first["msg"].removeprefix("Input should ")
-    return InputError(f"{where}: {place or 'it'} = {value}; it should {message}")
+    return InputError(f"{where}: {place or 'it'} = {value}; it must {message}")
 
 
 def _short(error: BaseException) -> str:

@@ -9,8 +9,9 @@ from typing import TYPE_CHECKING, Annotated
 import tyro
 
 from spikecam_env.cli.camera import CameraOptions
-from spikecam_env.cli.options import Count, Positive, Seed, Size, Whole
+from spikecam_env.cli.options import Size
 from spikecam_env.cli.reading import ReadingOptions
+from spikecam_env.numbers import Count, Positive, Seed, Whole
 
 if TYPE_CHECKING:
     from spikecam_env.campaign import Campaign

@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 import tyro
 
 from spikecam_env.cli.camera import CameraOptions
-from spikecam_env.cli.options import Count, Seed, Size, Whole, Workers
+from spikecam_env.cli.options import Size
+from spikecam_env.numbers import Count, Seed, Whole, Workers
 
 if TYPE_CHECKING:
     from spikecam_env.datasets import Plan

@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING, Any
 
 from spikecam_env.cli.camera import CameraOptions
 from spikecam_env.cli.mode_weights import Mode
-from spikecam_env.cli.options import Count, Rpm, Seed, Size
+from spikecam_env.cli.options import Size
+from spikecam_env.numbers import Count, Rpm, Seed
 
 if TYPE_CHECKING:
     from spikecam_env.cli.showcase import Streamed

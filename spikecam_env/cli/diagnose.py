@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import tyro
 
 from spikecam_env.cli.effect_files import EffectFiles
-from spikecam_env.cli.options import Effort, Seed, Workers
+from spikecam_env.numbers import Effort, Seed, Workers
 
 if TYPE_CHECKING:
     from spikecam_env.gap.result import Diagnosis

@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import tyro
 
-from spikecam_env.checked import checked_count, checked_number
-from spikecam_env.cli.options import Checked, Count, Size, Workers
+from spikecam_env.cli.options import Size
 from spikecam_env.errors import InputError
+from spikecam_env.numbers import Count, Range, WholeRange, Workers
 
 if TYPE_CHECKING:
     from denoiser.evaluate.rows import Weights
@@ -20,14 +20,6 @@ SHORTEST, LONGEST = 1.0, 1e4
 """Mean intervals [frames]; the longest is a spike in a quarter of a second at 40 kHz."""
 FASTEST = 100.0
 """Pixels a frame; a picture of 400 is crossed in 4 frames."""
-
-
-def _each(values: tuple[float, ...], name: str, least: float, most: float) -> None:
-    """Raises InputError for no numbers, and for one that is out of range."""
-    if not values:
-        raise InputError(f"{name} has no value; give one or more")
-    for value in values:
-        checked_number(value, name, least, most)
 
 
 @dataclass
@@ -82,11 +74,11 @@ class OnScenes(TableOptions):
     """Other scenes of the catalogue; `spikecam scenes` lists them."""
     size: Size = (250, 400)
     """Rows and columns."""
-    seeds: Annotated[int, Checked(checked_count, most=MOST_SCENES)] = 3
+    seeds: Annotated[int, WholeRange(1, MOST_SCENES)] = 3
     """Cameras before each scene, each with a fixed pattern and noise of its own; their spread is printed."""
-    intervals: Annotated[tuple[float, ...], Checked(_each, least=SHORTEST, most=LONGEST)] = (10.0,)
+    intervals: Annotated[tuple[float, ...], Range(SHORTEST, LONGEST)] = (10.0,)
     """Mean intervals between spikes [frames], each a group of the table; 3 10 40 100 go from bright to dim."""
-    speeds: Annotated[tuple[float, ...], Checked(_each, least=0.0, most=FASTEST)] = (0.0,)
+    speeds: Annotated[tuple[float, ...], Range(0.0, FASTEST)] = (0.0,)
     """Speeds of the motion [pixels a frame], each a group of the table; 0 is the scene's own speed."""
     frames: Count | None = None
     """Frames of each stream, whose middle one is the picture; by default as many as the interval asks for."""
@@ -172,11 +164,11 @@ class StillScenes(TableOptions):
     example:  spikecam evaluate still --out evaluation
     """
 
-    scenes: Annotated[int, Checked(checked_count, most=MOST_SCENES)] = 2
+    scenes: Annotated[int, WholeRange(1, MOST_SCENES)] = 2
     """Scenes at each of two light levels."""
     size: Size = (96, 96)
     """Rows and columns."""
-    seeds: Annotated[int, Checked(checked_count, most=MOST_SCENES)] = 3
+    seeds: Annotated[int, WholeRange(1, MOST_SCENES)] = 3
     """Cameras before each scene."""
     frames: Count = 400
     """Frames whose mean is judged."""

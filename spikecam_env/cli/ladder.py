@@ -8,7 +8,7 @@ from pathlib import Path
 import tyro
 
 from spikecam_env.cli.effect_files import EffectFiles
-from spikecam_env.cli.options import Seed, Workers
+from spikecam_env.numbers import Seed, Workers
 
 
 @dataclass

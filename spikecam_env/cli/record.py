@@ -7,7 +7,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from spikecam_env.cli.camera import CameraOptions
-from spikecam_env.cli.options import Count, Rpm, Seed, Size, Whole
+from spikecam_env.cli.options import Size
+from spikecam_env.numbers import Count, Rpm, Seed, Whole
 
 
 @dataclass

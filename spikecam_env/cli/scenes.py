@@ -9,8 +9,9 @@ from typing import Any
 
 import tyro
 
-from spikecam_env.cli.options import Count, Seed, Size
+from spikecam_env.cli.options import Size
 from spikecam_env.errors import InputError, unknown_name
+from spikecam_env.numbers import Count, Seed
 
 SHOWN_AT = 500
 """Frame of which the sheet has pictures."""

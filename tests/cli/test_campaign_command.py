@@ -89,7 +89,7 @@ def test_effects_explains_one(capsys) -> None:
         (("--effect", "dead_time:tau=1"), "unknown parameter of dead_time 'tau'; choose one of tau_us"),
         (("--effect", "dead_time:tau_us"), "tau_us has no value"),
         (("--effect", "dead_time:tau_us=far"), "dead_time.tau_us = 'far'; it must be a number"),
-        (("--effect", "dead_time:tau_us=90"), "outside 0 .. 25 us"),
+        (("--effect", "dead_time:tau_us=90"), "a number from 0 to 25 us"),
         (("--effect", "afterpulsing:delay_frames=2.5"), "must be a whole number"),
         (("--effect", "shot_noise:dark_is_noisy=maybe"), "must be true or false"),
         (("--without", "dead_time"), "unknown effect of scsim 'dead_time'"),
