@@ -9,7 +9,6 @@ noisy and clean twins have forgotten their common phase (DESIGN section 7).
 
 from __future__ import annotations
 
-import operator
 from pathlib import Path
 from typing import Any, TypedDict
 
@@ -19,7 +18,7 @@ from torch import Tensor
 from torch.utils.data import Dataset
 
 from denoiser.pairs import WARM_UP
-from spikecam_env.checked import checked_shape
+from spikecam_env.checked import checked_count, checked_seed, checked_shape, checked_whole
 from spikecam_env.datasets import read_window
 from spikecam_env.datasets.manifest import Manifest
 from spikecam_env.errors import InputError
@@ -68,7 +67,7 @@ class SpikeWindows(Dataset[Item]):
             raise InputError(f"{folder} has no scenes of split {split!r}; it has {', '.join(sorted(splits))}")
         if any(file["sha256"] is None for file in files):
             raise InputError(f"{folder} is not finished; run its `spikecam dataset` command again")
-        reach, stride, seed = _whole(reach, "reach", 0), _whole(stride, "stride", 1), _whole(seed, "seed", 0)
+        reach, stride, seed = checked_whole(reach, "reach", 0), checked_count(stride, "stride"), checked_seed(seed)
         rows, columns = manifest.settings["shape"]
         self.paths = [Path(folder) / file["path"] for file in files]
         self.shape = (int(rows), int(columns))
@@ -91,7 +90,7 @@ class SpikeWindows(Dataset[Item]):
 
     @epoch.setter
     def epoch(self, epoch: int) -> None:
-        self._epoch[0] = _whole(epoch, "epoch", 0)
+        self._epoch[0] = checked_whole(epoch, "epoch", 0)
 
     def __setstate__(self, state: dict[str, Any]) -> None:
         """A copy shares its epoch with the workers it gets, not with the data set it is a copy of."""
@@ -119,13 +118,3 @@ class SpikeWindows(Dataset[Item]):
             "row": row,
             "column": column,
         }
-
-
-def _whole(value: Any, name: str, least: int) -> int:
-    try:
-        number = operator.index(value)
-    except TypeError:
-        number = least - 1
-    if not least <= number < 2**63:
-        raise InputError(f"{name} is {value!r}; it must be a whole number, {least} or more")
-    return number

@@ -35,6 +35,7 @@ from denoiser.stream_network import StreamDnSS
 from denoiser.training_loop import RUN_FILE, learn, save_progress
 from denoiser.training_record import training_record
 from denoiser.weights import load_weights, save_weights
+from spikecam_env.checked import checked_number, checked_whole
 from spikecam_env.errors import InputError
 from spikecam_env.run_folder import run_folder
 from spikecam_env.sensor.kernels.cuda import checked_device
@@ -102,15 +103,10 @@ class TrainConfig:
     def __post_init__(self) -> None:
         recipe_of(self.mode)
         for name, (least, most) in _COUNTS.items():
-            value = getattr(self, name)
-            if not isinstance(value, int) or isinstance(value, bool) or not least <= value <= most:
-                raise InputError(f"{name} is {value!r}; it must be a whole number from {least} to {most}")
+            checked_whole(getattr(self, name), name, least, most)
         for name, highest in _AMOUNTS.items():
-            amount = getattr(self, name)
-            if name == "minutes" and amount is None:
-                continue
-            if not isinstance(amount, int | float) or isinstance(amount, bool) or not 0 < amount <= highest:
-                raise InputError(f"{name} is {amount!r}; it must be a number above 0, at most {highest:g}")
+            if name != "minutes" or self.minutes is not None:
+                checked_number(getattr(self, name), name, 0.0, highest, above=True)
         for name in ("resume", "refine", "compiled"):
             if not isinstance(getattr(self, name), bool):
                 raise InputError(f"{name} is {getattr(self, name)!r}; it must be True or False")
