@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import os
+import sys
+import webbrowser
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -50,13 +53,12 @@ class Demo:
 
     def run(self) -> None:
         from spikecam_env.cli.files import out_folder
-        from spikecam_env.cli.viewer import show_file
 
         with out_folder(self.out) as folder:
             lines = self._picture(folder) if self.quick else self._film(folder)
         print("\n".join(lines))
         shown = self.out / ("demo.png" if self.quick else "demo.mp4")
-        if self.open and show_file(shown):
+        if self.open and _opened(shown):
             print(f"opened {shown}")
 
     def _streamed(self, frames: int, least: int) -> Streamed:
@@ -105,3 +107,10 @@ class Demo:
         write_json(folder / "demo.json", {"options": options, "speed": speed, "table": rows})
         wrote = f"wrote {self.out / 'demo.mp4'}, and demo.png and demo.json beside it"
         return [table(rows), "", table([speed]), wrote]
+
+
+def _opened(path: Path) -> bool:
+    """Open a file as the desktop does; False where nobody would see it: without a terminal, or without a display."""
+    remote = sys.platform == "darwin" and "SSH_CONNECTION" in os.environ
+    bare = sys.platform == "linux" and not any(os.environ.get(name) for name in ("DISPLAY", "WAYLAND_DISPLAY"))
+    return sys.stdout.isatty() and not (remote or bare) and webbrowser.open(path.absolute().as_uri())
