@@ -23,7 +23,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from types import TracebackType
-from typing import Any, Literal
+from typing import Any, Literal, TypeGuard
 
 import h5py
 import numpy as np
@@ -32,8 +32,7 @@ from pydantic import ConfigDict
 
 from spikecam_env.checked import checked_number, checked_shape
 from spikecam_env.errors import InputError, NotReadyError, shown, unknown_name
-from spikecam_env.streams.files import check_range
-from spikecam_env.streams.packing import as_spikes, pack_checked, packed_bytes, unpack_frames
+from spikecam_env.streams.packing import as_spikes, check_range, pack_checked, packed_bytes, unpack_frames
 from spikecam_env.streams.whole_hdf5 import WholeHDF5
 from spikecam_env.untrusted import (
     Count,
@@ -49,6 +48,8 @@ from spikecam_env.version import __version__
 from spikecam_env.whole import check_file
 
 FORMAT = "spikecam-recording/1"
+HDF5 = (".h5", ".hdf5")
+"""Endings of the names of HDF5 files."""
 CHUNK_FRAMES = 32
 CHUNK_ROWS = 16
 CACHE_BYTES = 1 << 24
@@ -311,6 +312,11 @@ def is_recording(path: str | Path) -> bool:
     return not isinstance(found, str) or found.startswith("spikecam")
 
 
+def is_array(item: Any) -> TypeGuard[h5py.Dataset]:
+    """Whether something in a file is an array that has values."""
+    return isinstance(item, h5py.Dataset) and item.shape is not None
+
+
 def check_stored(dataset: h5py.Dataset, where: str) -> None:
     """Raises InputError where an array declares more than is stored: what lacks would be read as zeros."""
     declared_bytes = math.prod(dataset.shape) * dataset.dtype.itemsize
@@ -324,7 +330,7 @@ def check_stored(dataset: h5py.Dataset, where: str) -> None:
 
 def _stream(file: h5py.File, name: str, shape: tuple[int, int], where: str) -> h5py.Dataset:
     found = hdf5_item(file, name, where)
-    if not isinstance(found, h5py.Dataset) or found.shape is None:
+    if not is_array(found):
         raise InputError(f"{where}: {name} is no array")
     if found.dtype != np.uint8 or found.ndim != 2 or found.shape[1] != packed_bytes(shape):
         raise InputError(

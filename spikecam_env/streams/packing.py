@@ -12,7 +12,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from spikecam_env.checked import checked_shape as check_shape
+from spikecam_env.checked import checked_count, checked_shape, checked_whole
 from spikecam_env.errors import InputError, unknown_name
 
 BitOrder = Literal["little", "big"]
@@ -43,7 +43,7 @@ def unpack_frames(
     >>> unpack_frames(np.uint8([[9]]), (1, 4)).tolist()
     [[[1, 0, 0, 1]]]
     """
-    height, width = check_shape(shape)
+    height, width = checked_shape(shape)
     expected = packed_bytes((height, width))
     if packed.ndim != 2 or packed.dtype != np.uint8 or packed.shape[1] != expected:
         raise InputError(
@@ -100,3 +100,14 @@ def check_bit_order(bit_order: str) -> BitOrder:
     if bit_order not in ("little", "big"):
         raise unknown_name("bit_order", bit_order, ("little", "big"))
     return "little" if bit_order == "little" else "big"
+
+
+def check_range(first: int, count: int | None, frames: int, name: str) -> tuple[int, int]:
+    """(first, stop) of the frames to read; raises InputError, with the length of `name`, where they are not in it."""
+    first = checked_whole(first, "first", 0)
+    stop = frames if count is None else first + checked_count(count, "count")
+    if not first < stop <= frames:
+        raise InputError(
+            f"frames {first} to {stop} asked of {name}, which holds {frames}; need 0 <= first < stop <= {frames}"
+        )
+    return first, stop

@@ -28,7 +28,7 @@ from numpy.typing import NDArray
 
 from spikecam_env.errors import InputError, shown
 from spikecam_env.renamed import old_names
-from spikecam_env.streams.hdf5 import is_recording, open_recording
+from spikecam_env.streams.hdf5 import HDF5, is_recording, open_recording
 from spikecam_env.streams.packing import pack_checked, packed_bytes, unpack_frames
 from spikecam_env.streams.recording import read_recording
 from spikecam_env.streams.side_file import FrameLayout, geometry
@@ -55,7 +55,6 @@ PIPE_BYTES = 1 << 20
 most that Linux gives a user."""
 SET_PIPE_SIZE = 1031
 """F_SETPIPE_SZ of Linux; Python has the name from 3.10 on, there alone."""
-HDF5 = (".h5", ".hdf5")
 _REVERSED = np.packbits(np.unpackbits(np.arange(256, dtype=np.uint8)[:, None], axis=1)[:, ::-1], axis=1)[:, 0]
 """(256,) a byte with its bits in the other order."""
 FLOWING = ("height", "width", "crop_width", "flip", "bit_order")

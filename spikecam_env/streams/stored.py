@@ -29,8 +29,8 @@ from numpy.typing import NDArray
 
 from spikecam_env.checked import checked_whole
 from spikecam_env.errors import InputError, shown
-from spikecam_env.streams.files import check_range
 from spikecam_env.streams.geometry import KNOWN_SHAPES
+from spikecam_env.streams.packing import check_range
 
 EIGHT_BITS = (np.uint8, np.int8, np.bool_)
 
@@ -161,7 +161,7 @@ def time_axis(stored: NDArray[np.uint8], given: int | None, stated: int | None, 
                     f"{path} of shape {stored.shape} is read with time_axis={axis}; "
                     f"its spikes say time_axis={silent[0]}",
                     UserWarning,
-                    stacklevel=6,
+                    stacklevel=5,
                 )
             return int(axis), source
     if len(silent) == 1:

@@ -165,8 +165,9 @@ def test_options_out_of_range_are_refused(tmp_path: Path, ending: str, options: 
 
 def test_another_time_axis_than_the_spikes_say_is_warned_of(tmp_path: Path) -> None:
     np.save(tmp_path / "a.npy", np.moveaxis(regular(60, (50, 60)), 0, 2))
-    with pytest.warns(UserWarning, match=r"time_axis=0; its spikes say time_axis=2"):
+    with pytest.warns(UserWarning, match=r"time_axis=0; its spikes say time_axis=2") as warned:
         read_recording(tmp_path / "a.npy", time_axis=0)
+    assert warned[0].filename == __file__
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         read_recording(tmp_path / "a.npy", time_axis=2)
@@ -174,7 +175,7 @@ def test_another_time_axis_than_the_spikes_say_is_warned_of(tmp_path: Path) -> N
 
 def test_a_recording_of_this_package_takes_its_own_options(tmp_path: Path) -> None:
     write_own(tmp_path / "a.h5", regular())
-    assert reading_options(tmp_path / "a.h5") == ("first", "count", "stream")
+    assert reading_options(tmp_path / "a.h5") == ("stream", "first", "count")
     with pytest.raises(InputError, match=r"flip does not apply to \.h5 files of this package"):
         read_recording(tmp_path / "a.h5", flip=True)
 
