@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 @dataclass
 class DatasetOptions:
-    """What every dataset has."""
+    """Options of every dataset."""
 
     out: Path
     """Folder for the dataset; a run that was stopped goes on in it."""
@@ -53,7 +53,7 @@ class DatasetOptions:
         }
 
     def make(self, plan: Plan) -> None:
-        """Make it and say what was done."""
+        """Make the dataset, and print the number of its scenes."""
         from spikecam_env.datasets import build
 
         built = build(plan, self.out, jobs=self.jobs, ray=self.ray, progress=True)

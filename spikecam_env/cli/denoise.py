@@ -37,7 +37,7 @@ class Denoise:
     mode: Mode = "best"
     """Which DnSS: `best`, `fast` (a quarter of its weights), or `paper` (the paper's network; slower)."""
     engine: Literal["torch", "openvino"] = "torch"
-    """What computes the network; `openvino` (pip install 'spikecam-env[openvino]') takes no `paper`."""
+    """Library that computes the network; `openvino` (pip install 'spikecam-env[openvino]') takes no `paper`."""
     window: Count | None = None
     """Frames averaged in the pictures of spikes (TFP window); odd.  Default: 41, or all of a shorter recording.
     Pictures of the rate are of one frame."""

@@ -1,4 +1,4 @@
-"""`spikecam evaluate agents`: how well agents learn the tasks, by what they see."""
+"""`spikecam evaluate agents`: how well agents learn the tasks, by observation."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ class Agents:
         "frame1000",
         "tracker",
     )
-    """What agents see: tfp, tfi, spikes, rate (denoised), dim_rate (the same, brighter), clean (no noise), frame30,
+    """Observations: tfp, tfi, spikes, rate (denoised), dim_rate (the same, brighter), clean (no noise), frame30,
     frame1000.  Without training: tracker (classical, sees tfp), tracker-rate, tracker-clean; shipped (the task's
     shipped agent, trained on tfp, sees it), shipped-rate, shipped-clean."""
     intervals: tuple[float, ...] = ()

@@ -24,7 +24,7 @@ FASTEST = 100.0
 
 @dataclass
 class TableOptions:
-    """What every table has."""
+    """Options of every table."""
 
     out: Path | None = None
     """Folder for the table as text, JSON and a page of pictures; a run that was stopped goes on in it."""

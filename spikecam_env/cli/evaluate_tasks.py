@@ -1,4 +1,4 @@
-"""`spikecam evaluate tasks`: the ends of every task's score, what the oracle does and what doing nothing does."""
+"""`spikecam evaluate tasks`: the ends of every task's score, the oracle's and that of doing nothing."""
 
 from __future__ import annotations
 

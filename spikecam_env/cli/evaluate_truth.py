@@ -24,7 +24,7 @@ class EvaluateTruth:
     static: Path | None = None
     """A recording of a scene at rest: one half is denoised, the mean of the other is the truth."""
     moving: Path | None = None
-    """A recording in which everything moves: what stays at a pixel is the camera's own pattern."""
+    """A recording in which everything moves: a pattern that stays is the camera's own."""
     out: Path | None = None
     """Folder for truth.json and truth.txt."""
     modes: tuple[Mode, ...] = ("paper", "best")

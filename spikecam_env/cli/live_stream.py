@@ -42,7 +42,7 @@ class Live:
     """A scene of `spikecam scenes`; a file as `spikecam denoise` takes it; packed frames from standard input (-), a
     server (tcp://HOST:PORT, unix://PATH), a named pipe or a socket by its path."""
     film: Path | None = None
-    """Write a film (.mp4) of what a window would show; it is kept when the stream, or --seconds, is over."""
+    """Write a film (.mp4) instead of opening a window; it is kept when the stream, or --seconds, is over."""
     frames: Count | None = None
     """End after so many frames."""
     seconds: Positive | None = None

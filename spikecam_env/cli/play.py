@@ -33,9 +33,9 @@ MOST_PICTURES = 90_000
 class Play:
     """Steer a spike camera with the keyboard, or watch a policy steer it.
 
-    In a window where there is a display; else, and with --film, a film is written.  In the window: arrow keys or WASD
-    turn the camera, 1 to 4 answer (ReadSpin), 0 to 9 answer (ReadDigit), E and Q open and close the iris (Exposure),
-    space pauses, N begins another episode, Esc ends.
+    In a window where there is a display; else, and with --film, a film is written.  In the window, arrow keys or WASD
+    turn the camera.  1 to 4 answer (ReadSpin), 0 to 9 answer (ReadDigit), E and Q open and close the iris (Exposure).
+    Space pauses, N begins another episode, Esc ends.
 
     example:  spikecam play Track-v1
               spikecam play Catch-v1 --policy oracle --denoise --film catch.mp4

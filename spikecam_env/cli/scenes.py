@@ -1,4 +1,4 @@
-"""`spikecam scenes`: what there is to look at; pictures of it and films."""
+"""`spikecam scenes`: the catalogue of scenes, pictures of them and films."""
 
 from __future__ import annotations
 
@@ -119,7 +119,7 @@ class Scenes:
 
 
 def about(name: str) -> str:
-    """A scene's line: the first sentence of the file that it is in."""
+    """A scene's line: the first sentence of its file."""
     from scenes.catalogue import SCENES
 
     described = sys.modules[SCENES[name].__module__].__doc__ or ""

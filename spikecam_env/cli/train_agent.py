@@ -26,7 +26,7 @@ class TrainAgent:
     out: Path
     """Folder of the run: agent.pt, curve.json, and last.pt to go on from."""
     obs: str = "tfp"
-    """What the agent sees: tfp, tfi, spikes, rate (denoised), dim_rate (the same, brighter), clean (no noise),
+    """Observation: tfp, tfi, spikes, rate (denoised), dim_rate (the same, brighter), clean (no noise),
     frame30 or frame1000."""
     steps: Count | None = None
     """Steps of all environments together.  Default: as many as the shipped agents had."""
