@@ -166,7 +166,7 @@ def each_once(values: Iterable[object], what: str) -> None:
 
 
 _LITTLE = 1 << 24
-"""Bytes that every machine has: to look what there is costs two files read, the tenth part of a step at 64 x 64."""
+"""Bytes that every machine has: a look at its memory takes a tenth of a step at 64 x 64."""
 
 
 def checked_memory(size: int, what: str) -> None:
@@ -189,7 +189,7 @@ def checked_disk(size: int, path: str | Path, what: str) -> None:
 
 
 def memory_bytes() -> int:
-    """Memory of this machine, or what its container may use of it."""
+    """Memory of this machine, or the limit of its container."""
     try:
         most = os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE")
     except (AttributeError, ValueError, OSError):  # no POSIX system: no limit is known

@@ -1,8 +1,8 @@
 """The version of the code that makes a result: a digest of the modules that take part, whatever their form.
 
-Counted is what a module does: its syntax tree without docstrings, and so without comments and layout; and the data
-files beside it (presets, templates).  Taking part is what a module imports of its own package, and so on; a package
-that loads its modules by `pkgutil`, as the catalogue of effects does, imports all of them.
+A module counts by its syntax tree without docstrings, and so without comments and layout; data files beside it
+(presets, templates) count too.  Imports of its own package take part, and theirs; a package that loads its modules by
+`pkgutil`, as the catalogue of effects does, imports all of them.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ DIGITS = 12
 """Hexadecimal digits of a digest: two of a thousand versions are the same by chance once in 1e9."""
 
 UNREADABLE = "unknown"
-"""What is said where the package was installed without its sources."""
+"""The version where the package was installed without its sources."""
 
 DATA_SUFFIXES = (".npz", ".toml")
 """Endings of the data files that count."""
@@ -52,15 +52,15 @@ def sources_of(modules: tuple[str, ...], root: Path = ROOT) -> list[Path]:
 
     Raises FileNotFoundError where a module has no source.
     """
-    waiting, found = [_file_of(name, root) for name in modules], dict.fromkeys((root / "__init__.py",))
+    waiting, sources = [_file_of(name, root) for name in modules], dict.fromkeys((root / "__init__.py",))
     while waiting:
         path = waiting.pop()
-        if path not in found:
-            found[path] = None
+        if path not in sources:
+            sources[path] = None
             waiting += imported_by(path, root)
-    folders = {path.parent for path in found}
+    folders = {path.parent for path in sources}
     data = [p for f in folders for p in (*f.glob("*"), *f.glob("presets/*")) if p.suffix in DATA_SUFFIXES]
-    return sorted({*found, *data})
+    return sorted({*sources, *data})
 
 
 def imported_by(path: Path, root: Path = ROOT) -> Iterator[Path]:
@@ -92,20 +92,17 @@ def _file_of(name: str, root: Path) -> Path:
 
 
 def meaning_of(path: Path) -> str:
-    """What a source does, the same for every form of it and in every version of Python.
-
-    (`ast.dump` and `ast.unparse` differ between versions.)
-    """
-    return _said(ast.parse(path.read_text(encoding="utf-8")))
+    """The syntax of a source, the same for every layout and every version of Python; `ast.dump` differs by version."""
+    return _syntax(ast.parse(path.read_text(encoding="utf-8")))
 
 
-def _said(node: object) -> str:
+def _syntax(node: object) -> str:
     """A part of a syntax tree: kinds and fields of nodes, without empty fields and without bare strings."""
     if isinstance(node, ast.AST):
         inside = ((name, value) for name, value in ast.iter_fields(node) if value is not None and value != [])
-        return f"{type(node).__name__}({','.join(f'{name}={_said(value)}' for name, value in inside)})"
+        return f"{type(node).__name__}({','.join(f'{name}={_syntax(value)}' for name, value in inside)})"
     if isinstance(node, list):
-        return f"[{','.join(_said(part) for part in node if not _is_bare_string(part))}]"
+        return f"[{','.join(_syntax(part) for part in node if not _is_bare_string(part))}]"
     return repr(node)
 
 

@@ -61,7 +61,7 @@ class Range:
         return number if fits else None
 
     def rule(self, value: Any = None) -> str:
-        """What a value must be, in words."""
+        """The range in words, after "it must"."""
         rule = f"be {self._interval()}{self.unit and f' {self.unit}'}"
         return f"{rule}, or inf" if self.infinite else rule
 
@@ -104,7 +104,7 @@ class WholeRange(Range):
         return None if number is None or not self.least <= number <= self.most else number
 
     def rule(self, value: Any = None) -> str:
-        """What a value must be, in words."""
+        """The range in words, after "it must"."""
         number = as_whole(value)
         too_large = number is not None and number > self.most
         return f"be a whole number, {self.least} {f'to {self.most}' if too_large else 'or more'}"

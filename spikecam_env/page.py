@@ -37,7 +37,7 @@ tr.not td:nth-child(2) { color: #9a1c1c }
 
 
 def page(title: str, parts: Iterable[str], style: str = "") -> str:
-    """The whole file; style: CSS beside STYLE."""
+    """The whole file; `style` is CSS beside STYLE."""
     return (
         f'<!doctype html>\n<html lang="en"><head><meta charset="utf-8">'
         f'<meta name="viewport" content="width=device-width, initial-scale=1"><title>{html.escape(title)}</title>'
@@ -62,8 +62,13 @@ def table(
 ) -> str:
     """A table of plain text that scrolls by itself where the page is narrow.
 
-    numbers: columns aligned right.  classes: of each row, in order.  stack: on narrow screens a row becomes a block of
-    lines instead, one a cell, each with its column's name.  optional: columns that narrow screens do without.
+    Args:
+        head: names of the columns.
+        rows: cells of each row.
+        numbers: columns aligned right.
+        classes: of each row, in order.
+        stack: on narrow screens a row becomes a block of lines, one a cell, each with its column's name.
+        optional: columns that narrow screens do without.
     """
 
     def cell(text: str, column: int, tag: str) -> str:
@@ -84,7 +89,7 @@ def table(
 
 
 def picture(drawn: Figure, alt: str, *, form: str = "svg", dpi: int = 110) -> str:
-    """A matplotlib figure as an image inside the page, the same bytes for the same figure; form: "svg" or "png"."""
+    """A matplotlib figure as an image inside the page, `svg` or `png`; the same bytes for the same figure."""
     held = io.BytesIO()
     with mpl.rc_context({"svg.hashsalt": "spikecam", "svg.fonttype": "path"}):
         drawn.savefig(held, format=form, dpi=dpi, metadata={"Date": None} if form == "svg" else None)

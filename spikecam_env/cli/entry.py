@@ -1,10 +1,10 @@
 """Where the `spikecam` command begins and ends: signals, standard streams, exit codes.
 
-0                done
-1                an error of this package
-2                unusable input, or a fault of the disk, said in one line
-130, 143, 129    stopped by SIGINT, SIGTERM, SIGHUP (`spikecam_env.stopping`)
-141              whoever read the output has closed it
+- 0: done;
+- 1: an error of this package;
+- 2: unusable input, or a fault of the disk, in one line;
+- 130, 143, 129: stopped by SIGINT, SIGTERM, SIGHUP (`spikecam_env.stopping`);
+- 141: the reader of the output has closed it.
 """
 
 from __future__ import annotations

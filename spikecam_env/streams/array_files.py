@@ -60,7 +60,7 @@ def read_array_file(
 
     Raises:
         InputError: the file is absent or damaged, no or several arrays can be the stream, values are not 0 and 1, or
-            neither spikes nor shape decide on the axis of time.
+            the axis of time is open.
     """
     source = existing_file(path)
     choice = Choice(key, item, batch_axis, time_axis, flip, first, count)

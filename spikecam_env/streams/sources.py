@@ -42,7 +42,7 @@ except ImportError:  # Windows
 Packed = NDArray[np.uint8]
 """(frames, ceil(H W / 8))."""
 Receive = Callable[[memoryview], int]
-"""Puts bytes that have come into a buffer, and says how many; 0 at the end of a stream."""
+"""Puts bytes that have come into a buffer; returns their number, 0 at the end of a stream."""
 
 FRAME_RATE_HZ = 40_000.0
 """Of a stream that does not say: the Vidar camera's."""
@@ -66,7 +66,7 @@ class Source(Protocol):
 
     @property
     def title(self) -> str:
-        """What it is called."""
+        """Its name."""
 
     @property
     def shape(self) -> tuple[int, int]:
@@ -78,11 +78,11 @@ class Source(Protocol):
 
     @property
     def waits(self) -> bool:
-        """Whether frames wait until they are asked for, as those of a file do."""
+        """Whether frames wait to be read, as those of a file do."""
 
     @property
     def cut(self) -> str:
-        """What is wrong with how the stream ended, once it has; nothing where that is not known."""
+        """The fault of the end of the stream, once it has ended; empty where none is known."""
 
     def read(self, rows: Packed) -> int:
         """Fill rows with the next frames, from the first row on; how many, 0 at the end of the stream."""
@@ -93,14 +93,16 @@ class Source(Protocol):
 
 @dataclass
 class StoredFrames:
-    """Frames of a file.  fetch: fills rows with the frames from a number on.  loop: begin again at the end."""
+    """Frames of a file."""
 
     title: str
     shape: tuple[int, int]
     frame_rate_hz: float
     frames: int
     fetch: Callable[[int, Packed], object]
+    """Fills rows with the frames from a number on."""
     loop: bool = False
+    """Begin again at the end."""
     waits: bool = field(default=True, init=False)
     cut: str = field(default="", init=False)
     _next: int = field(default=0, init=False)
@@ -120,10 +122,7 @@ class StoredFrames:
 
 @dataclass
 class Flowing:
-    """Frames that a pipe or a socket brings, one after the other as `taken` says.
-
-    receive: what has come, into a buffer, and how many bytes; 0 at the end.
-    """
+    """Frames that a pipe or a socket brings, one after the other, in the layout `taken`."""
 
     title: str
     taken: FrameLayout
@@ -162,12 +161,15 @@ class Flowing:
 
 @contextmanager
 def open_source(where: str, *, loop: bool = False, **options: Any) -> Iterator[Source]:
-    """The stream at `where`, open inside the `with` block; see the module for what that can be.
+    """The stream at an address, open inside the `with` block.  Warns as `read_recording` does.
 
-    loop: a recording begins again when it is over.  options: of `read_recording`; of pipes and sockets height, width,
-    crop_width, flip and bit_order.
-    Warns as `read_recording` does.
-    Raises InputError for what cannot be opened or read, and for options that do not apply.
+    Args:
+        where: an address that the module lists.
+        loop: a recording begins again when it is over.
+        options: of `read_recording`; of pipes and sockets height, width, crop_width, flip and bit_order.
+
+    Raises:
+        InputError: a stream that cannot be opened or read, or options that do not apply.
     """
     with ExitStack() as stack:
         if is_flow(where):
@@ -181,7 +183,12 @@ def open_source(where: str, *, loop: bool = False, **options: Any) -> Iterator[S
 def turned(packed: Packed, taken: FrameLayout) -> Packed:
     """Frames as they lie in a file -> as this package packs them: columns kept, rows from the top, bits little-endian.
 
-    packed: (T, ceil(height width / 8)) -> (T, ceil(height columns / 8)), columns being crop_width where it is given.
+    Args:
+        packed: (T, ceil(height width / 8)).
+        taken: the layout of the file.
+
+    Returns:
+        (T, ceil(height columns / 8)), columns being crop_width where it is given.
     """
     columns = _columns(taken)
     if taken.width % 8 or columns % 8:
@@ -199,7 +206,7 @@ def is_flow(where: str) -> bool:
         return True
     try:
         kind = os.stat(where).st_mode
-    except (OSError, ValueError):  # no such file, or a zero in its name: said where it is opened
+    except (OSError, ValueError):  # no such file, or a zero in its name: an error where it is opened
         return False
     return stat.S_ISFIFO(kind) or stat.S_ISSOCK(kind)
 

@@ -3,11 +3,11 @@
 A frame is ceil(H W / 8) bytes, rows from the top, row-major, first pixel in the least significant bit.
 Known variants, by option:
 
-    public Vidar files     250 x 400, flip=True (rows are stored from the bottom)
-    416-wide dumps         width=416, crop_width=400
-    SPIFT, PHM             height=500, width=800, not flipped
-    big-endian dumps       bit_order="big"
-    SPS100 dumps           layout="packets", 1000 x 1000, see `packets`
+- public Vidar files: 250 x 400, flip=True (rows are stored from the bottom);
+- 416-wide dumps: width=416, crop_width=400;
+- SPIFT, PHM: height=500, width=800, not flipped;
+- big-endian dumps: bit_order="big";
+- SPS100 dumps: layout="packets", 1000 x 1000, see `packets`.
 
 Nothing in the file says which: geometry and flip are the caller's to give, or a side file's (`side_file`).  The spikes
 show when it is wrong (`geometry`), and the loaders warn.
@@ -231,7 +231,7 @@ def _doubt_of(source: Path, taken: FrameLayout) -> str:
 
 @lru_cache(maxsize=256)
 def _doubt(path: str, changed_ns: int, size: int, shape: tuple[int, int], bit_order: BitOrder) -> str:
-    """What the middle of a file says against a geometry; once a file, however often it is read in parts."""
+    """The doubt about a geometry by the middle of a file; once a file, however often it is read in parts."""
     probe = _probe(Path(path), packed_bytes(shape))
     if packets.looks_like_packets(probe.ravel()):
         return "it looks like the 64-byte packets of a megapixel camera; give layout='packets'"
