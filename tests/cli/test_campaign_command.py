@@ -10,13 +10,9 @@ import pytest
 
 from spikecam_env.campaign import read_campaign
 from spikecam_env.cli.camera import CameraOptions
-from spikecam_env.cli.main import run
 from spikecam_env.sensor import CATALOGUE, SensorModel
 from spikecam_env.streams import load_vidar_dat, save_npz
-
-
-def spikecam(*args: object) -> int:
-    return run([str(a) for a in args])
+from tests.commands import spikecam
 
 
 def test_simulate_writes_the_model_asked_for(tmp_path: Path, capsys) -> None:

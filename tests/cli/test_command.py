@@ -14,13 +14,9 @@ import pytest
 
 from spikecam_env.cli.main import COMMANDS, run
 from spikecam_env.streams import load_vidar_dat, read_recording
-from tests.films import film_in, picture_in
+from tests.commands import film_in, picture_in, spikecam
 
 SMALL = ("--size", "64", "96")
-
-
-def spikecam(*args: object) -> int:
-    return run([str(a) for a in args])
 
 
 @pytest.mark.parametrize("name", sorted(COMMANDS))

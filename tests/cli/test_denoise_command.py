@@ -11,17 +11,12 @@ from PIL import Image
 
 from denoiser import denoise
 from denoiser.metrics import psnr_db
-from spikecam_env.cli.main import run
 from spikecam_env.cli.panels import MARGIN, panel_scale
 from spikecam_env.streams import SpikeWriter, middleTFP, read_recording, read_truth, save_npz, save_vidar_dat
-from tests.films import film_in, picture_in
+from tests.commands import film_in, picture_in, spikecam
 
 SHAPE = (64, 96)
 FRAMES = 130
-
-
-def spikecam(*args: object) -> int:
-    return run([str(word) for word in args])
 
 
 @pytest.fixture(scope="module")

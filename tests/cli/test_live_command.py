@@ -16,20 +16,15 @@ import pytest
 from scenes import RotatingDisk
 from spikecam_env.cli.live.live_screen import LiveScreen
 from spikecam_env.cli.live.simulated import SimulatedSource
-from spikecam_env.cli.main import run
 from spikecam_env.cli.panels import MARGIN, display
 from spikecam_env.sensor import SpikeSensor
 from spikecam_env.streams import pack_frames, save_vidar_dat
-from tests.films import film_in
+from tests.commands import film_in, spikecam
 
 SHAPE = (24, 40)
 SIZE = ("--height", 24, "--width", 40)
 SCALE = 8
 """Pixels of the screen a pixel of so small a picture takes, each way."""
-
-
-def spikecam(*args: object) -> int:
-    return run([str(a) for a in args])
 
 
 @pytest.fixture(autouse=True)

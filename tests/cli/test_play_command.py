@@ -19,13 +19,8 @@ from spikecam_env.cli.live.keys import action_of, explained, plain
 from spikecam_env.cli.live.pictures import Denoised, Noisy
 from spikecam_env.cli.live.players import Player, player, steering
 from spikecam_env.cli.live.screen import AIM, TARGET, Screen
-from spikecam_env.cli.main import run
 from spikecam_env.envs.score import BASELINES, play
-from tests.films import film_in
-
-
-def spikecam(*args: object) -> int:
-    return run([str(a) for a in args])
+from tests.commands import film_in, spikecam
 
 
 @pytest.fixture(autouse=True)

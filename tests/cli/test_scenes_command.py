@@ -7,16 +7,11 @@ import numpy as np
 import pytest
 
 from scenes.catalogue import SCENES
-from spikecam_env.cli.main import run
 from spikecam_env.cli.panels import BACKGROUND, MARGIN, PicturePanel, compose, write_film
 from spikecam_env.streams import read_recording
-from tests.films import film_in, picture_in
+from tests.commands import film_in, picture_in, spikecam
 
 SIZE = ("--size", "24", "40")
-
-
-def spikecam(*args: object) -> int:
-    return run([str(a) for a in args])
 
 
 def test_every_scene_is_listed_with_a_line(capsys) -> None:

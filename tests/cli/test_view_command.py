@@ -16,17 +16,13 @@ from denoiser import OnlineDnSS
 from scenes.catalogue import make_scene
 from spikecam_env.cli.live.streams import Block, Stream, of_recording, of_scene
 from spikecam_env.cli.live.timeline import DENOISED, NOISY, TARGET, TimelineEntry, entries
-from spikecam_env.cli.main import run
 from spikecam_env.cli.panels import display
 from spikecam_env.sensor import SpikeSensor
 from spikecam_env.streams import save_npz
+from tests.commands import spikecam
 
 SHAPE = (12, 20)
 SMALL = ("--size", 12, 20)
-
-
-def spikecam(*args: object) -> int:
-    return run([str(a) for a in args])
 
 
 def spikes(frames: int) -> np.ndarray:
