@@ -1,4 +1,4 @@
-"""Files from outside: what is declared opens, whatever else is one InputError."""
+"""Files from outside: declared data opens, all else is one InputError."""
 
 from __future__ import annotations
 

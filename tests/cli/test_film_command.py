@@ -1,4 +1,4 @@
-"""`spikecam film`: what people film, as spikes; printed as it was done, and named where it cannot be."""
+"""`spikecam film`: films of users as spikes; the table states how, an error names the fault."""
 
 from __future__ import annotations
 

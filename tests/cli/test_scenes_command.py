@@ -43,23 +43,6 @@ def test_film_has_a_picture_every_so_many_frames(name: str, tmp_path: Path, caps
     assert "8 ms of disk, 50 times slower than life" in capsys.readouterr().out
 
 
-@pytest.mark.parametrize(
-    ("args", "message"),
-    [
-        (("nope",), "unknown scene 'nope'"),
-        (("--film", "a.mp4"), "which scene?"),
-        (("disk", "--film", "a.avi"), "unknown file type '.avi'"),
-        (("disk", "--film", "a.mp4", "--every", "0"), "--every 0"),
-        (("disk", "--film", "no/such/a.mp4"), "no folder"),
-        (("--out", "a.jpg"), "use .png"),
-        (("disk", "--size", "2", "9", "--out", "a.png"), "at least 8 rows"),
-    ],
-)
-def test_what_is_wrong_is_said_in_a_line(args: tuple[str, ...], message: str, capsys) -> None:
-    assert spikecam("scenes", *args) == 2
-    assert message in capsys.readouterr().err
-
-
 def test_record_takes_any_scene(tmp_path: Path, capsys) -> None:
     small = ("--frames", 40, "--size", 24, 40)
     for scene in ("collage", "dice"):

@@ -1,4 +1,4 @@
-"""Every format that `read_recording` reads: what was written comes back; whatever is wrong is one InputError."""
+"""Every format that `read_recording` reads: written streams come back; whatever is wrong is one InputError."""
 
 from __future__ import annotations
 
