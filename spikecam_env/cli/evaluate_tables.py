@@ -46,6 +46,11 @@ class TableOptions:
     jobs: Workers = 1
     """Worker processes, one thread each; 1 works in this one, with all threads."""
 
+    @property
+    def table(self) -> str:
+        """Its name: `table1`, ..., `still`."""
+        return type(self).__name__.lower().removesuffix("scenes")
+
     def given(self) -> Weights:
         """The files that were given."""
         from denoiser.evaluate.rows import Weights
@@ -55,15 +60,15 @@ class TableOptions:
             raise InputError(f"--weights {self.weights}: there is no such folder")
         return Weights.found(self.weights, {name: path for name, path in given.items() if path is not None})
 
-    def show(self, table: str, **options: Any) -> None:
-        """Make a table and print it."""
+    def show(self, **options: Any) -> None:
+        """Make the table and print it."""
         from denoiser.evaluate.table_report import report
         from denoiser.evaluate.tables import TableRequest, evaluate_table
 
-        asked = TableRequest(out=self.out, rows=self.rows, jobs=self.jobs, weights=self.given(), **options)
-        print(report(evaluate_table(table, asked, progress=True)), end="")
+        request = TableRequest(out=self.out, rows=self.rows, jobs=self.jobs, weights=self.given(), **options)
+        print(report(evaluate_table(self.table, request, progress=True)), end="")
         if self.out is not None:
-            print(f"wrote {table}.txt, {table}.json and {table}.png in {self.out}")
+            print(f"wrote {self.table}.txt, {self.table}.json and {self.table}.png in {self.out}")
 
 
 @dataclass
@@ -85,12 +90,10 @@ class OnScenes(TableOptions):
     data: Path | None = None
     """Dataset of `spikecam dataset phm-n` to take streams from, instead of simulating them."""
 
-    def make(self, table: str) -> None:
-        """Make a table on PHM_N and print it."""
+    def run(self) -> None:
         from denoiser.evaluate.phm import SCENES
 
         self.show(
-            table,
             scenes=self.scenes or SCENES,
             shape=self.size,
             seeds=self.seeds,
@@ -108,9 +111,8 @@ class OnRecordings(TableOptions):
     recordings: Path | None = None
     """Folder of the real recordings, with wall.npz and helicopter_low_light.npz."""
 
-    def make(self, table: str) -> None:
-        """Make a table on real recordings and print it."""
-        self.show(table, **({} if self.recordings is None else {"real": self.recordings}))
+    def run(self) -> None:
+        self.show(**({} if self.recordings is None else {"real": self.recordings}))
 
 
 @dataclass
@@ -120,9 +122,6 @@ class Table1(OnScenes):
     example:  spikecam evaluate table1 --jobs 2 --out evaluation
     """
 
-    def run(self) -> None:
-        self.make("table1")
-
 
 @dataclass
 class Table2(OnRecordings):
@@ -130,9 +129,6 @@ class Table2(OnRecordings):
 
     example:  spikecam evaluate table2 --out evaluation
     """
-
-    def run(self) -> None:
-        self.make("table2")
 
 
 @dataclass
@@ -142,9 +138,6 @@ class Table3(OnScenes):
     example:  spikecam evaluate table3 --jobs 2 --out evaluation
     """
 
-    def run(self) -> None:
-        self.make("table3")
-
 
 @dataclass
 class Table4(OnRecordings):
@@ -152,9 +145,6 @@ class Table4(OnRecordings):
 
     example:  spikecam evaluate table4 --out evaluation
     """
-
-    def run(self) -> None:
-        self.make("table4")
 
 
 @dataclass
@@ -174,4 +164,4 @@ class StillScenes(TableOptions):
     """Frames whose mean is judged."""
 
     def run(self) -> None:
-        self.show("still", still_scenes=self.scenes, shape=self.size, seeds=self.seeds, frames=self.frames)
+        self.show(still_scenes=self.scenes, shape=self.size, seeds=self.seeds, frames=self.frames)

@@ -121,7 +121,7 @@ def changed(folder: Path, name: str, data: bytes, good: dict = CAMPAIGN) -> Path
 
 
 def calibrated(target: str, folder: Path, out: Path, meets, through_command: bool = True) -> None:
-    """A campaign through its readers and, where they refuse it, through `calibrate`, which takes a second for good ones."""
+    """A campaign through its readers and, where they refuse it, through `calibrate`; a good one takes a second."""
     good = reads_or_refuses(target, lambda: [r.rate() if r.rates else r.load() for r in read_lit(folder)])
     if through_command and not good:
         assert meets(f"{target} (calibrate)", "calibrate", folder, "--out", out) == 2
