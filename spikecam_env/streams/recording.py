@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -70,15 +70,18 @@ def read_recording(path: str | Path, **options: Any) -> Recording:
         8 frames of 2 rows x 3 columns, key spikes, time_axis 0
     """
     read, allowed = _reader(path)
-    for name in options:
-        if name not in allowed:
-            own = " of this package" if read is read_hdf5 else ""
-            raise InputError(
-                f"option {name} does not apply to {Path(path).suffix.lower()} files{own}; "
-                f"they take {', '.join(allowed)}"
-            )
+    own = " of this package" if read is read_hdf5 else ""
+    check_options(options, allowed, f"{Path(path).suffix.lower()} files{own}")
     spikes, attributes = read(path, **options)
     return Recording(spikes, attributes.get("frame_rate_hz"), attributes)
+
+
+def check_options(options: Iterable[str], allowed: tuple[str, ...], kind: str) -> None:
+    """Raises InputError for the first option that a kind of stream does not have."""
+    for name in options:
+        if name not in allowed:
+            rest = f"; they take {', '.join(allowed)}" if allowed else ""
+            raise InputError(f"option {name} does not apply to {kind}{rest}")
 
 
 def reading_options(path: str | Path) -> tuple[str, ...]:

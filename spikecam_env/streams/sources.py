@@ -30,7 +30,7 @@ from spikecam_env.errors import InputError, shown
 from spikecam_env.renamed import old_names
 from spikecam_env.streams.hdf5 import HDF5, is_recording, open_recording
 from spikecam_env.streams.packing import pack_checked, packed_bytes, unpack_frames
-from spikecam_env.streams.recording import read_recording
+from spikecam_env.streams.recording import check_options, read_recording
 from spikecam_env.streams.side_file import FrameLayout, geometry
 from spikecam_env.streams.vidar import USUAL, read_dat
 
@@ -237,11 +237,12 @@ def _columns(taken: FrameLayout) -> int:
 def _stored(path: Path, loop: bool, options: dict[str, Any], stack: ExitStack) -> StoredFrames:
     ending = path.suffix.lower()
     if ending == ".dat":
-        how = read_dat(path, count=1, **_only(options, (*FLOWING, "layout"), f"{ending} files"))[1]
+        check_options(options, (*FLOWING, "layout"), f"{ending} files")
+        how = read_dat(path, count=1, **options)[1]
         if how["layout"] == "bits":
             return _dat_file(path, loop, how, stack)
     elif ending in HDF5 and is_recording(path):
-        _only(options, (), f"{ending} files of this package")
+        check_options(options, (), f"{ending} files of this package")
         return _own_recording(path, loop, stack)
     recording = read_recording(path, **options)
     packed = pack_checked(recording.spikes)
@@ -295,8 +296,8 @@ def _own_recording(path: Path, loop: bool, stack: ExitStack) -> StoredFrames:
 
 def _flowing(where: str, options: dict[str, Any], stack: ExitStack) -> Flowing:
     title = "standard input" if where == STANDARD_INPUT else where
-    given = {name: None for name in FLOWING} | _only(options, FLOWING, "pipes and sockets")
-    taken = geometry(Path(where), given, USUAL)
+    check_options(options, FLOWING, "pipes and sockets")
+    taken = geometry(Path(where), options, USUAL)
     if where == STANDARD_INPUT:
         if os.isatty(0):
             raise InputError("standard input is a terminal; pipe packed frames into it, e.g. with < recording.dat")
@@ -341,15 +342,6 @@ def _of_pipe(number: int) -> Receive:
         with suppress(OSError):  # no pipe, or no right to so large a one
             fcntl.fcntl(number, SET_PIPE_SIZE, PIPE_BYTES)
     return lambda room: os.readv(number, [room])
-
-
-def _only(options: dict[str, Any], allowed: tuple[str, ...], what: str) -> dict[str, Any]:
-    """The options; raises InputError for one that does not apply."""
-    for name in options:
-        if name not in allowed:
-            rest = f"; they take {', '.join(allowed)}" if allowed else ""
-            raise InputError(f"option {name} does not apply to {what}{rest}")
-    return options
 
 
 __getattr__ = old_names(__name__, {"Stored": "StoredFrames"})
