@@ -17,8 +17,8 @@ import tyro
 
 from spikecam_env import stopping
 from spikecam_env.cli.main import run_parsed
-from spikecam_env.cli.options import Count, Workers
 from spikecam_env.errors import InputError
+from spikecam_env.numbers import Count, Workers
 from spikecam_env.run_folder import run_folder
 from spikecam_env.whole import reason
 from tests.hidden_world import record, trial

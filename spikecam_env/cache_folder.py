@@ -1,6 +1,6 @@
 """Where results are kept that can be made again: the user's cache folder, as the system has it.
 
-SPIKECAM_CACHE names another.  What is in it may be removed at any time.
+SPIKECAM_CACHE names another.  Its files may be removed at any time.
 """
 
 from __future__ import annotations

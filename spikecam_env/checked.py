@@ -1,43 +1,54 @@
 """Values of a user that many functions take: sizes, counts, seeds, numbers; each is checked by one function.
 
-Whatever is refused is an InputError that says the value and what is allowed.
+Whatever is refused is an InputError that says the value and its range.
 """
 
 from __future__ import annotations
 
 import math
-import operator
 import os
 import shutil
 from collections.abc import Iterable
-from numbers import Real
 from pathlib import Path
 from typing import Any
 
 from spikecam_env.errors import InputError, shown
+from spikecam_env.numbers import (
+    LARGEST_COUNT as LARGEST_COUNT,
+)
+from spikecam_env.numbers import (
+    LARGEST_SEED as LARGEST_SEED,
+)
+from spikecam_env.numbers import (
+    MOST_PIXELS as MOST_PIXELS,
+)
+from spikecam_env.numbers import (
+    MOST_RPM as MOST_RPM,
+)
+from spikecam_env.numbers import (
+    Range,
+    WholeRange,
+    as_whole,
+    with_value,
+)
+from spikecam_env.numbers import (
+    as_number as as_number,
+)
 
-MOST_PIXELS = 1 << 26
-"""Largest picture [pixels], 8192 x 8192: 64 times that of the largest spike camera."""
-LARGEST_SEED = 2**63 - 1
-"""Largest seed of a user: files hold signed 64-bit numbers."""
 LARGEST_DERIVED_SEED = 2**128 - 1
 """Largest seed of a sensor, which may be made from a user's by arithmetic."""
-LARGEST_COUNT = 2**53
-"""Whole numbers beyond are not exact as float64, in which JSON tools hold them."""
-MOST_RPM = 1e9
-"""Fastest disk [turns a minute]: 1000 times the fastest motors."""
 
 
 def checked_shape(shape: Any, name: str = "shape") -> tuple[int, int]:
     """(rows, columns), both 1 or more, at most MOST_PIXELS together."""
     try:
-        rows, columns = (_whole(n) for n in shape)
+        rows, columns = (as_whole(n) or 0 for n in shape)
     except (TypeError, ValueError):
         rows = columns = 0
     if rows < 1 or columns < 1:
-        raise InputError(f"{_said(name, shape)}; it must be two positive whole numbers, (rows, columns)")
+        raise InputError(f"{with_value(name, shape)}; it must be two positive whole numbers, (rows, columns)")
     if rows * columns > MOST_PIXELS:
-        raise InputError(f"{_said(name, shape)}; it must be at most {MOST_PIXELS} pixels (8192 x 8192)")
+        raise InputError(f"{with_value(name, shape)}; it must be at most {MOST_PIXELS} pixels (8192 x 8192)")
     return rows, columns
 
 
@@ -53,28 +64,18 @@ def checked_seed(seed: Any, name: str = "seed", most: int = LARGEST_SEED) -> int
 
 def checked_whole(value: Any, name: str, least: int = -LARGEST_COUNT, most: int = LARGEST_COUNT) -> int:
     """A whole number from `least` to `most`; true and false are none."""
-    if type(value) is int and least <= value <= most:  # what nearly all are
+    if type(value) is int and least <= value <= most:  # nearly all are
         return value
-    try:
-        number = _whole(value)
-    except TypeError:
-        number = least - 1
-    if not least <= number <= most:
-        rule = f"{least} or more" if number < least else f"{least} to {most}"
-        raise InputError(f"{_said(name, value)}; it must be a whole number, {rule}")
-    return number
+    return WholeRange(least, most).check(value, name)
 
 
 def checked_number(
     value: Any, name: str, least: float = -math.inf, most: float = math.inf, *, unit: str = "", above: bool = False
 ) -> float:
     """A finite number from `least` to `most`; `above`: not `least` itself."""
-    if type(value) is float and least < value < most:  # what nearly all are
+    if type(value) is float and least < value < most:  # nearly all are
         return value
-    number = as_number(value)
-    if not (math.isfinite(number) and least <= number <= most) or (above and number == least):
-        raise InputError(f"{_said(name, value)}; it must be {_range(least, most, above)}{unit and f' {unit}'}")
-    return number
+    return Range(least, most, unit, above).check(value, name)
 
 
 def checked_numbers(
@@ -100,12 +101,12 @@ def checked_numbers(
         >>> checked_numbers([1, 2.5], "offset", 2)
         (1.0, 2.5)
     """
-    numbers = [] if isinstance(values, (str, bytes, dict, set)) else _listed(values)
-    found = tuple(map(as_number, numbers))
-    if len(found) != count or not all(math.isfinite(n) and least <= n <= most for n in found):
+    listed = [] if isinstance(values, (str, bytes, dict, set)) else _listed(values)
+    numbers = [number for number in map(Range(least, most).number, listed) if number is not None]
+    if not len(numbers) == len(listed) == count:
         rule = "finite numbers" if least == -math.inf else f"numbers from {least:g} to {most:g}"
-        raise InputError(f"{_said(name, values)}; it must be {count} {rule}{unit and f' {unit}'}")
-    return found
+        raise InputError(f"{with_value(name, values)}; it must be {count} {rule}{unit and f' {unit}'}")
+    return tuple(numbers)
 
 
 def _listed(values: Any) -> list[Any]:
@@ -137,15 +138,7 @@ def checked_switch(value: Any, name: str) -> bool:
     """
     if type(value).__name__ in ("bool", "bool_"):  # numpy's too, which commands do not import for this
         return bool(value)
-    raise InputError(f"{_said(name, value)}; it must be True or False")
-
-
-def checked_above_zero(value: Any, name: str) -> float:
-    """A number above 0, which may be infinite."""
-    number = as_number(value)
-    if not number > 0:
-        raise InputError(f"{_said(name, value)}; it must be a number above 0, or inf")
-    return number
+    raise InputError(f"{with_value(name, value)}; it must be True or False")
 
 
 def each_once(values: Iterable[object], what: str) -> None:
@@ -172,18 +165,8 @@ def each_once(values: Iterable[object], what: str) -> None:
         seen.append(value)
 
 
-def as_number(value: Any) -> float:
-    """A number as a float; NaN for text, true and false, arrays, and whatever else is no real number or too large."""
-    if not isinstance(value, Real) or isinstance(value, bool):
-        return math.nan
-    try:
-        return float(value)
-    except (ValueError, OverflowError):
-        return math.nan
-
-
 _LITTLE = 1 << 24
-"""Bytes that every machine has: to look what there is costs two files read, the tenth part of a step at 64 x 64."""
+"""Bytes that every machine has: a look at its memory takes a tenth of a step at 64 x 64."""
 
 
 def checked_memory(size: int, what: str) -> None:
@@ -206,7 +189,7 @@ def checked_disk(size: int, path: str | Path, what: str) -> None:
 
 
 def memory_bytes() -> int:
-    """Memory of this machine, or what its container may use of it."""
+    """Memory of this machine, or the limit of its container."""
     try:
         most = os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE")
     except (AttributeError, ValueError, OSError):  # no POSIX system: no limit is known
@@ -226,24 +209,3 @@ def _amount(size: float) -> str:
             return f"{size:.3g} {unit}"
         size /= 1000
     return f"{size:.3g} TB"
-
-
-def _said(name: str, value: Any) -> str:
-    """A name and its value; options of a command as they are typed."""
-    if not name.startswith("--"):
-        return f"{name} = {shown(value)}"
-    return f"{name} {' '.join(shown(item) for item in value) if isinstance(value, tuple) else shown(value)}"
-
-
-def _whole(value: Any) -> int:
-    if isinstance(value, bool):
-        raise TypeError
-    return operator.index(value)
-
-
-def _range(least: float, most: float, above: bool) -> str:
-    if least == -math.inf and most == math.inf:
-        return "a finite number"
-    if most == math.inf:
-        return f"a finite number {'above' if above else 'of at least'} {least:g}"
-    return f"a number {'above' if above else 'from'} {least:g} {'and up to' if above else 'to'} {most:g}"

@@ -1,8 +1,8 @@
 """The version of the code that makes a result: a digest of the modules that take part, whatever their form.
 
-A module counts by its syntax tree without docstrings, and so without comments and layout.  Data files beside it count
-too (presets, templates).  The modules that it imports of its own package take part, and so on.  A package that loads
-its modules by `pkgutil`, as the catalogue of effects does, imports all of them.
+A module counts by its syntax tree without docstrings, and so without comments and layout; data files beside it
+(presets, templates) count too.  Imports of its own package take part, and theirs; a package that loads its modules by
+`pkgutil`, as the catalogue of effects does, imports all of them.
 """
 
 from __future__ import annotations
@@ -53,15 +53,15 @@ def sources_of(modules: tuple[str, ...], root: Path = ROOT) -> list[Path]:
     Raises:
         FileNotFoundError: where a module has no source.
     """
-    waiting, found = [_file_of(name, root) for name in modules], dict.fromkeys((root / "__init__.py",))
+    waiting, sources = [_file_of(name, root) for name in modules], dict.fromkeys((root / "__init__.py",))
     while waiting:
         path = waiting.pop()
-        if path not in found:
-            found[path] = None
+        if path not in sources:
+            sources[path] = None
             waiting += imported_by(path, root)
-    folders = {path.parent for path in found}
+    folders = {path.parent for path in sources}
     data = [p for f in folders for p in (*f.glob("*"), *f.glob("presets/*")) if p.suffix in DATA_SUFFIXES]
-    return sorted({*found, *data})
+    return sorted({*sources, *data})
 
 
 def imported_by(path: Path, root: Path = ROOT) -> Iterator[Path]:
@@ -93,20 +93,17 @@ def _file_of(name: str, root: Path) -> Path:
 
 
 def meaning_of(path: Path) -> str:
-    """The syntax tree of a source as text, the same for every layout and in every version of Python.
-
-    (`ast.dump` and `ast.unparse` differ between versions.)
-    """
-    return _said(ast.parse(path.read_text(encoding="utf-8")))
+    """The syntax of a source, the same for every layout and every version of Python; `ast.dump` differs by version."""
+    return _syntax(ast.parse(path.read_text(encoding="utf-8")))
 
 
-def _said(node: object) -> str:
+def _syntax(node: object) -> str:
     """A part of a syntax tree: kinds and fields of nodes, without empty fields and without bare strings."""
     if isinstance(node, ast.AST):
         inside = ((name, value) for name, value in ast.iter_fields(node) if value is not None and value != [])
-        return f"{type(node).__name__}({','.join(f'{name}={_said(value)}' for name, value in inside)})"
+        return f"{type(node).__name__}({','.join(f'{name}={_syntax(value)}' for name, value in inside)})"
     if isinstance(node, list):
-        return f"[{','.join(_said(part) for part in node if not _is_bare_string(part))}]"
+        return f"[{','.join(_syntax(part) for part in node if not _is_bare_string(part))}]"
     return repr(node)
 
 

@@ -5,8 +5,8 @@ be written to: a read-only package in a container without a home.  Here code is 
 among temporary files, and where there is none it is compiled anew by every process.  NUMBA_CACHE_DIR names another.
 
 Processes that start together, as environments of a vector or workers of a dataset do, need the same functions at the
-same moment.  One compiles a function, and the others wait and read what it has kept: to compile the sensor's loop takes
-a processor up to a minute.
+same moment.  One compiles a function, and the others wait and read the result: to compile the sensor's loop takes a
+processor up to a minute.
 
 With NUMBA_DISABLE_JIT functions stay Python; those of the fast engine and of painting cannot, and say so when called.
 """
@@ -37,7 +37,7 @@ LONGEST_WAIT_S = 600.0
 def njit(*, cache: bool = False, **options: Any) -> Callable[[Compiled], Compiled]:
     """Decorator as `numba.njit(cache=cache, **options)`, except that there need be no place for the cache.
 
-    What it returns has the type of the function, so that calls of compiled code are checked as others are.
+    The result has the type of the function, so that type checkers check calls of compiled code.
     """
 
     def decorate(function: Compiled) -> Compiled:

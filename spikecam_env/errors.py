@@ -1,7 +1,7 @@
 """Which error to raise.
 
-- `InputError`: a value, file or option from the user is unusable.  The message names the value, what is
-  allowed, and what to do; the command line prints it in one line and exits with code 2.
+- `InputError`: a value, file or option from the user is unusable.  The message names the value, the allowed ones, and
+  a remedy; the command line prints it in one line and exits with code 2.
 - `WriteError`: an `InputError` of a file that cannot be written: a full disk, a read-only folder.
 - `OwnCodeError`: an `InputError` of a user's own code, an effect for one, that failed or returned an unusable value.
 - `NotReadyError`: a call came before the one it needs (stepping before reset).
@@ -16,29 +16,31 @@ from difflib import get_close_matches
 
 
 class InputError(ValueError):
-    """An unusable value: says which, what is allowed, what to do.
+    """An unusable value: names it, the allowed ones, and a remedy.
 
-    >>> from spikecam_env.sensor import Circuit
-    >>> Circuit(reset_V=50.0)
-    Traceback (most recent call last):
-        ...
-    spikecam_env.errors.InputError: circuit.reset_V = 50.0 is outside -20 .. 20 V
+    Example:
+        >>> from spikecam_env.sensor import Circuit
+        >>> Circuit(reset_V=50.0)
+        Traceback (most recent call last):
+            ...
+        spikecam_env.errors.InputError: circuit.reset_V = 50.0; it must be a number from -20 to 20 V
     """
 
 
 class WriteError(InputError, OSError):
     """A file or folder that cannot be written: says which and why.
 
-    >>> from spikecam_env.sensor import SensorModel
-    >>> SensorModel.preset("ideal").to_toml("nowhere/model.toml")
-    Traceback (most recent call last):
-        ...
-    spikecam_env.errors.WriteError: cannot write nowhere/model.toml: there is no folder nowhere; make it first
+    Example:
+        >>> from spikecam_env.sensor import SensorModel
+        >>> SensorModel.preset("ideal").to_toml("nowhere/model.toml")
+        Traceback (most recent call last):
+            ...
+        spikecam_env.errors.WriteError: cannot write nowhere/model.toml: there is no folder nowhere; make it first
     """
 
 
 class OwnCodeError(InputError):
-    """A user's own code that failed or returned an unusable value: says where and why; `__cause__` is what it raised.
+    """A user's own code that failed or returned an unusable value: says where and why; `__cause__` is its exception.
 
     Example:
         >>> from spikecam_env.own_code import own_code
@@ -53,19 +55,21 @@ class OwnCodeError(InputError):
 class NotReadyError(RuntimeError):
     """A call in the wrong order: says which call has to come first.
 
-    >>> from spikecam_env.envs.rotating_disk import RotatingDiskEnv
-    >>> RotatingDiskEnv(shape=(16, 24)).step([0.0, 0.0])
-    Traceback (most recent call last):
-        ...
-    spikecam_env.errors.NotReadyError: the environment has no scene yet; call reset first
+    Example:
+        >>> from spikecam_env.envs.rotating_disk import RotatingDiskEnv
+        >>> RotatingDiskEnv(shape=(16, 24)).step([0.0, 0.0])
+        Traceback (most recent call last):
+            ...
+        spikecam_env.errors.NotReadyError: the environment has no scene yet; call reset first
     """
 
 
 def unknown_name(kind: str, name: object, allowed: Iterable[str]) -> InputError:
     """Error for a name that is not in a list: `unknown scene 'fun'; choose one of ball, fan, train (fan?)`.
 
-    >>> unknown_name("scene", "fun", ["ball", "fan"])
-    InputError("unknown scene 'fun'; choose one of ball, fan (fan?)")
+    Example:
+        >>> unknown_name("scene", "fun", ["ball", "fan"])
+        InputError("unknown scene 'fun'; choose one of ball, fan (fan?)")
     """
     names = sorted(allowed)
     nearest = "".join(f" ({near}?)" for near in get_close_matches(shown(name).strip("'"), names, n=1))

@@ -1,6 +1,7 @@
-"""Whether this process may be a fork of another: then what threads of the other one held is not to be relied on.
+"""Whether this process may be a fork of another.
 
-A fork copies one thread.  In it, libraries with threads of their own (OpenMP, OpenGL) wait for threads that are gone.
+A fork copies one thread alone.  Libraries with threads of their own (OpenMP, OpenGL) wait in it for
+threads that are gone.
 """
 
 from __future__ import annotations

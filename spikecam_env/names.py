@@ -23,38 +23,46 @@ _DEVICES = frozenset({"con", "prn", "aux", "nul", *(f"{port}{n}" for port in ("c
 """Names that Windows keeps for devices, with any ending."""
 
 
-def file_name(text: str, what: str) -> str:
+def file_name(text: str, kind: str) -> str:
     """The text; raises InputError unless it is a plain file name on every system.
 
-    what: begins the error's text, e.g. "recording name".
+    Args:
+        text: of a file or a user.
+        kind: begins the error's text, e.g. "recording name".
     """
     rule = _broken_rule(text)
     if rule:
-        raise InputError(f"{what} {shown(text)} {rule}; give a plain file name: letters, digits, dots, dashes")
+        raise InputError(f"{kind} {shown(text)} {rule}; give a plain file name: letters, digits, dots, dashes")
     return text
 
 
-def distinct(names: Iterable[str], what: str) -> None:
+def distinct(names: Iterable[str], kind: str) -> None:
     """Raises InputError where two names are one file: the same text, or the same but for upper and lower case."""
     seen: dict[str, list[str]] = {}
     for name in names:
         seen.setdefault(unicodedata.normalize("NFC", name).casefold(), []).append(name)
     for same in seen.values():
         if len(same) > 1 and len(set(same)) == 1:
-            raise InputError(f"{len(same)} {what}s are named {same[0]!r}; give them names of their own")
+            raise InputError(f"{len(same)} {kind}s are named {same[0]!r}; give them names of their own")
         if len(same) > 1:
-            raise InputError(f"{what}s {same[0]!r} and {same[1]!r} are one file where case does not count; rename one")
+            raise InputError(f"{kind}s {same[0]!r} and {same[1]!r} are one file where case does not count; rename one")
 
 
-def inside(folder: str | Path, text: str, what: str, *, outside: bool = False) -> Path:
+def inside(folder: str | Path, text: str, kind: str, *, outside: bool = False) -> Path:
     """The path that a text in a file means, relative to its folder.
 
-    outside: take paths that leave the folder too, by `..`, from the root, or over a symbolic link.
-    Raises InputError for text that is no path, and for one that leaves the folder unless `outside`.
+    Args:
+        folder: of the file.
+        text: in the file.
+        kind: begins the error's text.
+        outside: take paths that leave the folder too, by `..`, from the root, or over a symbolic link.
+
+    Raises:
+        InputError: the text is no path, or leaves the folder, unless `outside`.
     """
     root = Path(folder)
     if not text or not text.isprintable() or not _encodes(text):
-        raise InputError(f"{what} {shown(text)} is no path of a file")
+        raise InputError(f"{kind} {shown(text)} is no path of a file")
     path = root / text
     absolute = Path(text).is_absolute() or bool(PureWindowsPath(text).anchor)
     try:
@@ -64,10 +72,10 @@ def inside(folder: str | Path, text: str, what: str, *, outside: bool = False) -
         leaves = absolute or ".." in PureWindowsPath(text).parts or not path.resolve().is_relative_to(root.resolve())
     except (OSError, RuntimeError) as error:  # names too long, links in a circle, folders that cannot be looked into
         why = getattr(error, "strerror", None) or "a circle of links"
-        raise InputError(f"{what} {shown(text)} cannot be read: {why}") from error
+        raise InputError(f"{kind} {shown(text)} cannot be read: {why}") from error
     if leaves and not outside:
         raise InputError(
-            f"{what} {shown(text)} is outside of {root}; copy the file there, or allow it (--outside, outside=True)"
+            f"{kind} {shown(text)} is outside of {root}; copy the file there, or allow it (--outside, outside=True)"
         )
     return path
 

@@ -5,8 +5,8 @@
           ├──▶ a module is being imported: no exception may pass it ─────────────────────────────────────────────▶ leave
           └──▶ a thread, woken through a pipe, waits GRACE_S, for a call that does not come back ────────────────▶ leave
 
-Callbacks of compiled code, finalisers and a bare `except` swallow what a signal handler raises.  So `leave` needs
-nobody's help: it kills the processes that were started, does what `when_stopped` was given, writes one line, and ends
+Callbacks of compiled code, finalisers and a bare `except` swallow the exceptions of signal handlers.  So `leave` needs
+nobody's help: it kills the processes that were started, runs the actions of `when_stopped`, writes one line, and ends
 the process.  A second signal leaves at once.
 
 Only the command stops so: in a library's user the handlers are the user's.
@@ -27,7 +27,7 @@ from types import FrameType
 from typing import Any, NoReturn
 
 GRACE_S = 1.0
-"""Time to unwind in [s]; what is left of the two seconds is for `leave`."""
+"""Time to unwind in [s]; the rest of the two seconds is for `leave`."""
 SAME_S = 0.2
 """Signals that follow the first within this time [s] are the same request: `timeout` sends to process and group."""
 IMPORTING = "<frozen importlib._bootstrap>"
@@ -37,7 +37,7 @@ NAMES = ("SIGINT", "SIGTERM", "SIGHUP")
 
 
 class Stopped(KeyboardInterrupt):
-    """The command was asked to stop: libraries treat it as they treat Ctrl-C.  code: 128 + the signal's number."""
+    """The command was asked to stop; libraries treat this as Ctrl-C.  Its `code` is 128 + the signal's number."""
 
     def __init__(self, signum: int) -> None:
         super().__init__(signum)
@@ -45,11 +45,13 @@ class Stopped(KeyboardInterrupt):
 
 
 class _State:
-    """Of this process.  code: exit code, once a signal has come.  done: the command's work is over."""
+    """Of this process."""
 
     code: int | None = None
+    """Exit code, once a signal has come."""
     raised: weakref.ref[Stopped] | None = None
     done = False
+    """Whether the command's work is over."""
     watching = False
     leaving = threading.Lock()
 
@@ -59,9 +61,9 @@ _actions: dict[object, Callable[[], object]] = {}
 
 def is_command() -> bool:
     """Whether this interpreter was started as `spikecam ...` or `python -m spikecam_env ...`, not by one that was."""
-    asked = sys.orig_argv
-    by_name = os.path.basename(sys.argv[0] if sys.argv else "") == "spikecam" and sys.argv[0] in asked
-    return by_name or ("-m" in asked[:-1] and asked[asked.index("-m") + 1] == "spikecam_env")
+    words = sys.orig_argv
+    by_name = os.path.basename(sys.argv[0] if sys.argv else "") == "spikecam" and sys.argv[0] in words
+    return by_name or ("-m" in words[:-1] and words[words.index("-m") + 1] == "spikecam_env")
 
 
 def watch() -> None:
@@ -100,9 +102,9 @@ def watched() -> Iterator[None]:
 
 @contextmanager
 def when_stopped(action: Callable[[], object]) -> Iterator[None]:
-    """What to do before the process ends if it must end within the block; on other ways out of it nothing is done.
+    """Run an action before the process ends if it must end within the block, and not on other ways out of it.
 
-    The action removes what is half made.  It may run in another thread, while the block goes on.
+    The action removes half-made files.  It may run in another thread, while the block goes on.
     """
     key = object()
     _actions[key] = action
@@ -140,12 +142,12 @@ def finish(code: int) -> NoReturn:
 
 
 def is_stopping() -> bool:
-    """Whether a signal has come: what goes wrong from then on follows from it, and is not worth a word."""
+    """Whether a signal has come: later faults follow from it, and are not worth a word."""
     return _State.code is not None
 
 
 def leave(code: int) -> NoReturn:
-    """End this process now: its children, what is half made, one line, exit code."""
+    """End this process now: its children and half-made files go; one line, exit code."""
     if not _State.leaving.acquire(blocking=False):
         time.sleep(60)  # another thread is leaving, and takes this one with it
     for _ in range(3):  # one killed may have just started another
@@ -216,7 +218,7 @@ def _leave_after(wait_s: float, code: int) -> None:
 
 
 def _occupy_standard_streams() -> None:
-    """Of those that were closed the numbers go to the next files that are opened, which then take what is printed."""
+    """Open closed ones: their numbers would go to the next files that are opened, and output into these."""
     for number in range(3):
         try:
             os.fstat(number)
@@ -225,7 +227,7 @@ def _occupy_standard_streams() -> None:
 
 
 def _forget() -> None:
-    """A forked process is not the command: signals do there what they did before."""
+    """A forked process is not the command: signals act there as before."""
     signal.set_wakeup_fd(-1)
     for name in NAMES:
         number = getattr(signal, name, None)
@@ -239,9 +241,9 @@ def _hush(name: str, module: Any) -> None:
     """After a signal no hook prints a traceback: exceptions then follow from it.  One that nobody caught leaves."""
     before = getattr(module, name)
 
-    def hook(*what: Any) -> None:
+    def hook(*args: Any) -> None:
         if _State.code is None:
-            before(*what)
+            before(*args)
         elif threading.current_thread() is threading.main_thread():
             leave(_State.code)
 
@@ -266,15 +268,15 @@ def _kill_descendants() -> None:
 
 def _children() -> dict[int, list[int]]:
     """Processes by the one that started them, of those that live."""
-    found: dict[int, list[int]] = {}
+    children: dict[int, list[int]] = {}
     try:
         pids = [name for name in os.listdir("/proc") if name.isdigit()]
     except OSError:
-        return found
+        return children
     for name in pids:
         with suppress(OSError, ValueError, IndexError):
             with open(f"/proc/{name}/stat", encoding="utf-8", errors="replace") as file:
                 state, parent = file.read().rpartition(")")[2].split()[:2]
             if state not in "ZX":
-                found.setdefault(int(parent), []).append(int(name))
-    return found
+                children.setdefault(int(parent), []).append(int(name))
+    return children

@@ -1,8 +1,8 @@
 """Threads for compiled code that lets others run: our own, not numba's.
 
 numba's OpenMP layer aborts in a process forked after its first use, which is how vector environments start.  It also
-sets the threads of all that uses OpenMP, torch too, as soon as numba is asked how many it has.  How many there are here
-is NUMBA_NUM_THREADS, by default the processors, or what `limit_threads` says.
+sets the threads of all that uses OpenMP, torch too, as soon as numba is asked how many it has.  Their number here is
+that of `limit_threads`, else NUMBA_NUM_THREADS, by default the processors.
 """
 
 from __future__ import annotations
@@ -27,27 +27,28 @@ _LIBC = ctypes.PyDLL(None) if sys.platform == "linux" else None
 
 
 def limit_threads(count: int | None) -> None:
-    """Threads of this process where none are asked for, from now on; None for NUMBA_NUM_THREADS."""
+    """Threads of this process by default, from now on; None for NUMBA_NUM_THREADS."""
     global _limit
     _limit = count
 
 
 def as_many(threads: int | None, most: int) -> int:
-    """How many threads to share work among: as many as asked for (default: see above), at most `most`."""
+    """Number of threads to share work among, `threads` or the default, at most `most`."""
     default = config.NUMBA_NUM_THREADS if _limit is None else _limit  # type: ignore[attr-defined]
-    asked = default if threads is None else threads
-    return max(1, min(asked, most))
+    return max(1, min(default if threads is None else threads, most))
 
 
 def as_many_as_pay(threads: int | None, most: int, pixel_steps: int) -> int:
-    """The same for so many pixel-steps of the sensor: as many as asked for and as pay."""
+    """The same for so many pixel-steps of the sensor, and at most as many as pay."""
     return as_many(threads, min(most, pixel_steps // PIXEL_STEPS_A_THREAD))
 
 
 def together(parts: list[Callable[[], None]], *, shared: bool = False) -> None:
     """Run parts at once, the first on this thread.
 
-    shared: each part takes what is left of the whole, so one that has not begun when the first is done need not.
+    Args:
+        parts: functions without arguments.
+        shared: each part takes the rest of the whole, so one that has not begun when the first is done need not.
     """
     others = []
     if len(parts) > 1:
@@ -62,7 +63,10 @@ def together(parts: list[Callable[[], None]], *, shared: bool = False) -> None:
 def share_out(work: Callable[[int], None], count: int, threads: int | None = None) -> None:
     """Call work(0) ... work(count - 1), in any order; each thread takes the next one when it is ready.
 
-    threads: default NUMBA_NUM_THREADS, at most `count`.
+    Args:
+        work: a function of a number.
+        count: of calls.
+        threads: default NUMBA_NUM_THREADS; at most `count`.
     """
     waiting = counter()
 

@@ -10,16 +10,17 @@ from contextlib import contextmanager
 def torch_settings(threads: int | None = None, seed: int | None = None) -> Iterator[None]:
     """Within it torch computes on `threads` threads, and its global generators begin at `seed`; None changes nothing.
 
-    What holds for a whole process is the caller's: a second thread left behind by a library waits by spinning, which
+    Settings of a whole process are the caller's: a second thread left behind by a library waits by spinning, which
     beside other work on the same cores costs a factor of seven and more.
 
-    >>> import torch
-    >>> before = torch.get_num_threads()
-    >>> with torch_settings(threads=1, seed=0):
-    ...     torch.get_num_threads()
-    1
-    >>> torch.get_num_threads() == before
-    True
+    Example:
+        >>> import torch
+        >>> before = torch.get_num_threads()
+        >>> with torch_settings(threads=1, seed=0):
+        ...     torch.get_num_threads()
+        1
+        >>> torch.get_num_threads() == before
+        True
     """
     import torch
 

@@ -1,7 +1,7 @@
 """Files from outside, read in one place: JSON, TOML, arrays and HDF5, checked before anyone uses them.
 
 A format declares its entries once, as a `Declared` class with types and ranges; `declared` checks data against it.
-Whatever is wrong is an InputError that names the file, the entry, its value and what is allowed.
+Faults are InputErrors that name the file, the entry, its value and the allowed ones.
 
     class Camera(Declared):
         height: Count
@@ -29,9 +29,24 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
-from spikecam_env.checked import LARGEST_COUNT, LARGEST_SEED, MOST_PIXELS, checked_memory, each_once
+from spikecam_env.checked import checked_memory, each_once
 from spikecam_env.errors import InputError, shown, unknown_name
 from spikecam_env.locks import warn_without_locks
+from spikecam_env.numbers import (
+    Count as Count,
+)
+from spikecam_env.numbers import (
+    Positive as Positive,
+)
+from spikecam_env.numbers import (
+    Seed as Seed,
+)
+from spikecam_env.numbers import (
+    Side as Side,
+)
+from spikecam_env.numbers import (
+    Whole as Whole,
+)
 
 if sys.version_info >= (3, 11):
     import tomllib
@@ -41,16 +56,6 @@ else:
 MOST_TEXT_BYTES = 64 << 20
 """Largest JSON or TOML file that is read; the largest this package writes take a few MB."""
 
-Count = Annotated[int, Field(ge=1, le=LARGEST_COUNT)]
-"""A whole number, 1 or more."""
-Whole = Annotated[int, Field(ge=0, le=LARGEST_COUNT)]
-"""A whole number, 0 or more."""
-Seed = Annotated[int, Field(ge=0, le=LARGEST_SEED)]
-"""A seed of random numbers."""
-Side = Annotated[int, Field(ge=1, le=MOST_PIXELS)]
-"""Rows or columns of a picture."""
-Positive = Annotated[float, Field(gt=0)]
-"""A finite number above 0."""
 Name = Annotated[str, Field(min_length=1, max_length=255)]
 """Text that is not empty."""
 
@@ -67,8 +72,13 @@ D = TypeVar("D", bound=BaseModel)
 def declared(kind: type[D], data: Any, where: str) -> D:
     """Data as an instance of a `Declared` class.
 
-    where: begins the error's text, e.g. a file's path.
-    Raises InputError that names the first entry that is missing, unknown, of another type or out of range.
+    Args:
+        kind: the class.
+        data: of a file.
+        where: begins the error's text, e.g. a file's path.
+
+    Raises:
+        InputError: names the first entry that is missing, unknown, of another type or out of range.
     """
     try:
         return kind.model_validate(data)
@@ -89,7 +99,8 @@ def checked_format(data: Any, expected: str, where: str) -> dict[str, Any]:
 def read_json(path: str | Path) -> Any:
     """The value in a JSON file.
 
-    Raises InputError where it is missing, too large, not UTF-8, not JSON, nested too deeply or has NaN or Infinity.
+    Raises:
+        InputError: the file is missing, too large, not UTF-8, not JSON, nested too deeply, or has NaN or Infinity.
     """
     return parse_json(read_text(path), str(path))
 
@@ -133,10 +144,18 @@ def read_text(path: str | Path) -> str:
 def read_table(
     path: str | Path, columns: Collection[str], needed: Sequence[str] = ()
 ) -> list[tuple[int, dict[str, str]]]:
-    """Rows of a CSV table whose first line names its columns: (line, cell by column), text without spaces about it.
+    """Rows of a CSV table whose first line names its columns; a row may be shorter than these, not longer.
 
-    columns: those allowed.  needed: those that must be there.  A row may be shorter than the columns, not longer.
-    Raises InputError, with the line, for unknown, repeated and missing columns, rows that are too long, and no table.
+    Args:
+        path: of the table.
+        columns: allowed ones.
+        needed: those that must be there.
+
+    Returns:
+        (line, cell by column) of each row, cells without spaces about them.
+
+    Raises:
+        InputError: with the line, for unknown, repeated and missing columns, rows that are too long, and no table.
     """
     lines = csv.reader(io.StringIO(read_text(path), newline=""), skipinitialspace=True)
     rows: list[tuple[int, dict[str, str]]] = []
@@ -175,8 +194,9 @@ def array_names(path: str | Path) -> set[str]:
 def read_arrays(path: str | Path, names: Iterable[str] | None = None) -> dict[str, NDArray[Any]]:
     """Arrays of an `.npz` by name, all of them or those of `names`; Python objects are never unpickled.
 
-    Raises InputError where the file is missing, no `.npz`, damaged, lacks a name, holds Python objects, or declares
-    more data than it has.
+    Raises:
+        InputError: the file is missing, no `.npz`, damaged, lacks a name, holds Python objects, or declares more data
+            than it has.
     """
     source = existing_file(path)
     try:
@@ -199,7 +219,8 @@ def read_arrays(path: str | Path, names: Iterable[str] | None = None) -> dict[st
 def open_hdf5(path: str | Path) -> h5py.File:
     """An HDF5 file, open for reading, without a lock where the file system has none.
 
-    Raises InputError where it is missing, truncated or none, or another program has it locked.
+    Raises:
+        InputError: the file is missing, truncated or none, or another program has it locked.
     """
     source = existing_file(path)
     try:
@@ -214,10 +235,7 @@ def open_hdf5(path: str | Path) -> h5py.File:
 
 
 def hdf5_attributes(item: h5py.HLObject, where: str) -> dict[str, Any]:
-    """Attributes by name, as Python's own numbers, text and lists; anything else as h5py has it.
-
-    Raises InputError for an attribute that cannot be read.
-    """
+    """Attributes by name, as Python's own numbers, text and lists; anything else as h5py has it."""
     try:
         return {str(name): _plain(item.attrs[name]) for name in item.attrs}
     except Exception as error:  # h5py has no words for many types
@@ -225,42 +243,48 @@ def hdf5_attributes(item: h5py.HLObject, where: str) -> dict[str, Any]:
 
 
 def hdf5_item(group: h5py.Group, path: str, where: str, *, outside: bool = False) -> h5py.Group | h5py.Dataset:
-    """What is at a path in a file, e.g. "truth/frame".
+    """The group or array at a path in a file, e.g. "truth/frame".
 
-    outside: follow links, external storage and virtual data, which may lie in other files.
-    Raises InputError where there is nothing, or it is a link or its values are in another file, unless `outside`.
+    Args:
+        group: file, or group in it.
+        path: in the group.
+        where: begins the error's text.
+        outside: follow links, external storage and virtual data, which may lie in other files.
+
+    Raises:
+        InputError: there is nothing; or, unless `outside`, it is a link or its values are in another file.
     """
-    found: Any = group
+    item: Any = group
     for part in filter(None, path.split("/")):
-        if not isinstance(found, h5py.Group) or part not in found.keys():  # noqa: SIM118 - `in` follows links
-            held = ", ".join(found.keys()) if isinstance(found, h5py.Group) else "values"
+        if not isinstance(item, h5py.Group) or part not in item.keys():  # noqa: SIM118 - `in` follows links
+            held = ", ".join(item.keys()) if isinstance(item, h5py.Group) else "values"
             raise InputError(f"{where} has no {path!r}; it holds {_cut(held) or 'nothing'}")
         try:
-            if not outside and found.id.links.get_info(part.encode()).type != h5py.h5l.TYPE_HARD:
+            if not outside and item.id.links.get_info(part.encode()).type != h5py.h5l.TYPE_HARD:
                 raise InputError(f"{where}: {path} is a link; copy the data into the file, or allow it (outside=True)")
-            found = found[part]
+            item = item[part]
         except InputError:
             raise
         except Exception as error:
             raise InputError(f"{where}: {path} cannot be read ({_short(error)})") from error
-    if not outside and isinstance(found, h5py.Dataset) and (found.external or found.is_virtual):
+    if not outside and isinstance(item, h5py.Dataset) and (item.external or item.is_virtual):
         raise InputError(f"{where}: {path} is stored in other files; copy it into one, or allow it (outside=True)")
-    return found
+    return item
 
 
 def hdf5_values(group: h5py.Group, path: str, where: str, part: Any = (), *, outside: bool = False) -> NDArray[Any]:
     """An array, or its part, e.g. `slice(0, 100)`; raises InputError as `hdf5_item`, and where it cannot be read."""
-    found = hdf5_item(group, path, where, outside=outside)
-    if not isinstance(found, h5py.Dataset) or found.shape is None:
+    item = hdf5_item(group, path, where, outside=outside)
+    if not isinstance(item, h5py.Dataset) or item.shape is None:
         raise InputError(f"{where}: {path} is no array")
     try:
-        asked = math.prod(_selected(found.shape, part))
-        checked_memory(asked * found.dtype.itemsize, f"{where}: {path}, {found.dtype} of shape {found.shape},")
-        return np.asarray(found[part])
+        size = math.prod(_selected(item.shape, part))
+        checked_memory(size * item.dtype.itemsize, f"{where}: {path}, {item.dtype} of shape {item.shape},")
+        return np.asarray(item[part])
     except InputError:
         raise
     except MemoryError as error:
-        raise InputError(f"{where}: {path} of shape {found.shape} does not fit in memory; read a part") from error
+        raise InputError(f"{where}: {path} of shape {item.shape} does not fit in memory; read a part") from error
     except Exception as error:  # filters, checksums, types without a numpy counterpart
         raise InputError(f"{where}: {path} cannot be read ({_short(error)})") from error
 
@@ -369,7 +393,7 @@ def _as_input_error(error: ValidationError, kind: type[BaseModel], where: str) -
         allowed = first["ctx"]["expected"].replace("'", "").replace(" or ", ", ")
         return InputError(f"{where}: {place} = {value}; choose one of {allowed}")
     message = first["msg"].removeprefix("Input should ")
-    return InputError(f"{where}: {place or 'it'} = {value}; it should {message}")
+    return InputError(f"{where}: {place or 'it'} = {value}; it must {message}")
 
 
 def _short(error: BaseException) -> str:

@@ -1,9 +1,9 @@
 """Files and folders that appear whole: written beside their place, then renamed; nothing is left if writing fails.
 
-What is being written is hidden, `.NAME.PID.HOST-RANDOM.partial.SUFFIX`, and locked by the process that writes it.  The
-system lifts the lock when that process ends, however it ends.  So what a killed one left is known, and the next that
-writes into the folder removes it.  Some shared file systems lock for one machine only: what another machine began is
-removed when nobody has touched it for a day.  On those without locks it stays.
+A file being written is hidden, `.NAME.PID.HOST-RANDOM.partial.SUFFIX`, and locked by the process that writes it.  The
+system lifts the lock when that process ends, however it ends.  So files of a killed process are known, and the next
+that writes into the folder removes them.  Some shared file systems lock for one machine only: files of another machine
+are removed when nobody has touched them for a day.  On file systems without locks they stay.
 """
 
 from __future__ import annotations
@@ -32,14 +32,15 @@ ATTEMPTS = 8
 """At a hidden name, which another process may clear before it is locked."""
 PARTIAL = re.compile(r"\..*\.\d+\.(?P<host>[0-9a-f]{8})-[0-9a-f]{8}\.partial(\..*)?", re.DOTALL)
 ABANDONED_S = 86_400.0
-"""Time [s] after which what another machine left untouched is given up."""
+"""Time [s] after which an untouched file of another machine is given up."""
 
 
 @contextmanager
 def whole_file(path: str | Path) -> Iterator[Path]:
     """A path to write to; on leaving without an exception it replaces `path`, or the file that `path` links to.
 
-    Errors: WriteError as of `check_file`, and where writing fails, e.g. on a full disk.
+    Raises:
+        WriteError: as of `check_file`, and where writing fails, e.g. on a full disk.
     """
     target = _file_at(path)
     with said_of(path), _beside(target, _new_file) as beside:
@@ -79,10 +80,10 @@ def whole_folder(path: str | Path, use: str = "results", *, replace: bool = Fals
 
 @contextmanager
 def made_folder(path: str | Path, use: str = "results") -> Iterator[Path]:
-    """A folder for `use`, made if needed with those it is in; what was made goes again if the block fails before
-    anything is in it.
+    """A folder for `use`, made if needed with those it is in; new ones go if the block fails while they are empty.
 
-    Errors: WriteError where it cannot be made, or takes no new files.
+    Raises:
+        WriteError: the folder cannot be made, or takes no new files.
     """
     unusable = _unusable(path, use)
     target = _resolved(path, unusable)
@@ -91,10 +92,11 @@ def made_folder(path: str | Path, use: str = "results") -> Iterator[Path]:
 
 
 def check_file(path: str | Path) -> None:
-    """Whether a file can be written to `path`, asked before long work; costs next to nothing.
+    """Check before long work that a file can be written to `path`; costs next to nothing.
 
-    Errors: WriteError if its folder does not exist or takes no new files, a folder or a device is in the way, its name
-    is too long, or links lead in a loop.
+    Raises:
+        WriteError: its folder does not exist or takes no new files, a folder or a device is in the way, or its name is
+            no path.
     """
     target = _file_at(path)
     with said_of(path), _beside(target, _new_file, locked=False):
@@ -134,19 +136,19 @@ def is_unfinished(path: Path) -> bool:
 
 
 def clear_unfinished(folder: Path) -> None:
-    """Remove what is half written in a folder and below, whoever is at it: for a run that is `alone_in` it."""
+    """Remove half-written files in a folder and below, whoever writes them: for a run that is `alone_in` it."""
     for path in folder.rglob(".*"):
         if is_unfinished(path):
             _remove(path)
 
 
 def clear_abandoned(folder: Path) -> None:
-    """Remove what killed processes left half written in a folder."""
+    """Remove half-written files of killed processes in a folder."""
     try:
-        found = [match for match in map(PARTIAL.fullmatch, os.listdir(folder)) if match]
+        partials = [match for match in map(PARTIAL.fullmatch, os.listdir(folder)) if match]
     except OSError:
         return
-    for match in found:
+    for match in partials:
         name = match[0]
         with suppress(OSError):  # somebody is at work on it, or it is not ours to remove
             if match["host"] != _host() and time.time() - (folder / name).stat().st_mtime < ABANDONED_S:
@@ -253,7 +255,7 @@ def _named(beside: Path, path: str | Path) -> Iterator[None]:
 
 
 def _move(beside: Path, target: Path, path: str | Path) -> None:
-    """What is in the hidden folder `beside` into the folder `target`, all of it or none."""
+    """Move files of the hidden folder `beside` into the folder `target`, all of them or none."""
     if not target.exists():
         os.replace(beside, target)
         return
@@ -264,13 +266,13 @@ def _move(beside: Path, target: Path, path: str | Path) -> None:
     with _beside(target / "replaced", os.mkdir) as kept:
         for entry, place in moves:
             _keep(place, kept / entry.name)
-        begun: list[tuple[Path, Path]] = []
+        moved: list[tuple[Path, Path]] = []
         try:
             for entry, place in moves:
-                begun.append((kept / entry.name, place))
+                moved.append((kept / entry.name, place))
                 os.replace(entry, place)
         except BaseException:
-            _put_back(begun)
+            _put_back(moved)
             raise
 
 
@@ -285,7 +287,7 @@ def _keep(file: Path, place: Path) -> None:
 
 
 def _put_back(replaced: list[tuple[Path, Path]]) -> None:
-    """Files from where they are kept to their places; what is not kept was not there before."""
+    """Move kept files back to their places, and remove new ones."""
     for kept, place in replaced:
         with suppress(OSError):
             if kept.exists():

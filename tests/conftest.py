@@ -1,8 +1,8 @@
-"""What holds for all tests.
+"""Settings of all tests.
 
-Two processes that test have a core each, so BLAS and torch take one thread in each, and in what these start: a second
+Two processes that test have a core each, so BLAS and torch take one thread in each, and in their children: a second
 one that waits spins, on the other's core.  A solve of 128 equations then takes 27 times the processor time, on two busy
-cores.  What sets torch's threads for a while sets them back: one test that did not would slow all that come after.
+cores.  A test that sets torch's threads sets them back: else it would slow all that come after.
 
 Files with slow tests come first: two processes that take file after file end together, not one with a long file last.
 The very first takes a minute and needs no compiled code, which the other process compiles meanwhile: two that need the
@@ -19,7 +19,7 @@ from collections.abc import Iterator
 import pytest
 
 os.environ.setdefault("OMP_NUM_THREADS", "1")  # read by OpenBLAS, MKL and torch as they are imported
-os.environ.setdefault("GOMP_SPINCOUNT", "10000")  # as the command has it: what is tested with two threads waits asleep
+os.environ.setdefault("GOMP_SPINCOUNT", "10000")  # as in the command: a test with two threads waits asleep
 
 
 FIRST = "test_site.py"
@@ -56,7 +56,7 @@ def pytest_terminal_summary(terminalreporter) -> None:
 
 
 def counted(terminalreporter, name: str) -> dict[str, Counter[str]]:
-    """What tests have recorded under a name, over all of them: target -> outcome -> how often."""
+    """Counts that tests have recorded under a name, over all of them: target -> outcome -> count."""
     tally: dict[str, Counter[str]] = {}
     for report in (r for reports in terminalreporter.stats.values() for r in reports):
         if getattr(report, "when", "") != "teardown":

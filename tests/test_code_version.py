@@ -1,4 +1,4 @@
-"""The digest of code: what a source does counts, how it is written does not."""
+"""The digest of code: the meaning of a source counts, its layout does not."""
 
 from __future__ import annotations
 

@@ -89,13 +89,6 @@ def temporary(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]
     compiled.private_folder.cache_clear()
 
 
-def test_a_private_folder_is_made_for_its_user_alone(temporary: Path) -> None:
-    assert compiled.private_folder() == temporary
-    assert stat.S_IMODE(temporary.stat().st_mode) == 0o700
-    compiled.private_folder.cache_clear()
-    assert compiled.private_folder() == temporary
-
-
 @pytest.mark.parametrize("trap", ["others may write", "a link", "a file", "somebody else's"])
 def test_code_is_not_kept_where_others_could_put_theirs(trap: str, temporary: Path, monkeypatch) -> None:
     if trap == "others may write":

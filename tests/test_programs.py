@@ -1,6 +1,6 @@
-"""Imports: what programs find, what packages spare and offer, and what no library may import.
+"""Imports: imports of programs, and imports that packages spare, offer, or may not make.
 
-Programs of a checkout take minutes and are run by hand; these tests say that they still find what they import.
+Programs of a checkout take minutes and are run by hand; these tests say that their imports are still found.
 """
 
 from __future__ import annotations
@@ -43,7 +43,7 @@ def test_an_import_spares_what_only_some_calls_need(module: str, spared: tuple[s
 @pytest.mark.parametrize("package", ["spikecam_env", "scenes", "denoiser"])
 def test_what_a_package_offers_is_not_lost_to_a_module_of_that_name(package: str) -> None:
     """When a module is first imported, it becomes an attribute of its package, over whatever has the same name there:
-    `from package import name` would depend on what was imported before."""
+    `from package import name` would depend on earlier imports."""
     lost = []
     for init in (ROOT / package).rglob("__init__.py"):
         inside = {path.stem for path in init.parent.iterdir() if path.suffix == ".py" or path.is_dir()}

@@ -1,4 +1,4 @@
-"""Files about the project say what the project is: versions, Pythons, formats, commands."""
+"""Files about the project describe it as it is: versions, Pythons, formats, commands."""
 
 from __future__ import annotations
 

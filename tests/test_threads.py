@@ -18,7 +18,7 @@ from scenes.trajectories import Spinning
 from scenes.world import Body, World
 
 torch.set_num_threads(1)
-torch.get_num_threads()  # torch sets what it remembers at its first use
+torch.get_num_threads()  # torch sets its memory of it at its first use
 ball = Body("ball", assemble(sphere(0.5)), Spinning((0, 1, 0), rpm=900))
 World((24, 40), (ball,), renderer=Embree()).radiance(0, 8)
 print(torch.get_num_threads())

@@ -40,7 +40,7 @@ def test_they_do_not_hold_after_an_error_either():
 
 @pytest.mark.parametrize("place", LEARNERS)
 def test_training_takes_its_own_and_leaves_them_to_the_caller(place, tmp_path, monkeypatch):
-    """What computes is stood in for: two threads of torch spin for minutes where other work has the processors."""
+    """The computation has a stand-in: two threads of torch spin for minutes where other work has the processors."""
     seen = []
     monkeypatch.setattr(place.replace(":", "."), lambda *_: seen.append((torch.get_num_threads(), torch.rand(3))))
     torch.manual_seed(5)

@@ -1,4 +1,4 @@
-"""Files from outside: what is declared opens, whatever else is one InputError."""
+"""Files from outside: declared data opens, all else is one InputError."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ def test_what_is_declared_is_taken():
         ({"height": 10**5000}, "height = a int"),
         ({"height": 3, "rate_hz": 10**400}, "rate_hz"),
         ({"height": 3, "rate_hz": float("nan")}, "finite"),
-        ({"height": 3, "rate_hz": -1.0}, "greater than 0"),
+        ({"height": 3, "rate_hz": -1.0}, "above 0"),
         ({"height": 3, "rate_hz": True}, "rate_hz = True"),
         ({"height": 3, "note": ["a"]}, "note"),
         ([1], "dictionary"),

@@ -1,4 +1,4 @@
-"""The sdist and the wheel that is built from it: what is in them, and that the installed package runs by itself."""
+"""The sdist and the wheel that is built from it: their files, and that the installed package runs by itself."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ def run(*words: object, cwd: Path, **environment: str) -> str:
 
 @pytest.fixture(scope="module")
 def sources(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The checkout's files without what was built in it."""
+    """The checkout's files, without built ones."""
     listed = subprocess.run(
         ["git", "ls-files", "-z", "--cached", "--others", "--exclude-standard"], cwd=ROOT, capture_output=True
     )
@@ -64,7 +64,7 @@ def sdist(sources: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope="module")
 def wheel(sdist: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Built from the sdist, so that what an sdist lacks is missed."""
+    """Built from the sdist, so that a file which the sdist lacks is missed."""
     out = tmp_path_factory.mktemp("wheel")
     pip = (sys.executable, "-m", "pip", "wheel", "--quiet", "--no-index", "--no-deps", "--no-build-isolation")
     run(*pip, "--wheel-dir", out, sdist, cwd=out)
@@ -74,7 +74,7 @@ def wheel(sdist: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope="module")
 def installed(wheel: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The only folder on PYTHONPATH of what is tried below; the dependencies are the environment's."""
+    """The only folder on PYTHONPATH below; the dependencies are the environment's."""
     folder = tmp_path_factory.mktemp("installed")
     pip = (sys.executable, "-m", "pip", "install", "--quiet", "--no-index", "--no-deps")
     run(*pip, "--target", folder, wheel, cwd=folder)

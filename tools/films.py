@@ -14,9 +14,8 @@ import sys
 import tempfile
 from pathlib import Path
 
-import imageio.v3 as imageio
+import av
 import tyro
-from PIL import Image
 
 from spikecam_env.errors import InputError, unknown_name
 from spikecam_env.whole import whole_file
@@ -52,9 +51,10 @@ def make(film: Path, command: str) -> None:
 
 def write_poster(film: Path) -> None:
     """The picture half-way through the film."""
-    pictures = imageio.imread(film)
+    with av.open(film) as container:
+        pictures = [frame.to_image() for frame in container.decode(video=0)]
     with whole_file(poster_of(film)) as beside:
-        Image.fromarray(pictures[len(pictures) // 2]).save(beside, format="JPEG", quality=QUALITY, optimize=True)
+        pictures[len(pictures) // 2].save(beside, format="JPEG", quality=QUALITY, optimize=True)
 
 
 def main(only: tuple[str, ...] = (), anew: bool = False) -> None:

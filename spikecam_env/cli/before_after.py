@@ -1,7 +1,7 @@
-"""Pictures of a stream before and after the denoiser, and their captions: what `demo` and `denoise` share.
+"""Pictures of a stream before and after the denoiser, and their captions, for `demo` and `denoise`.
 
 A picture is a mean over a window of frames (TFP), or of one instant (TFI of spikes, the denoiser's rate plane).  Every
-caption says which: what moves is smeared in the first, and crisp in the second.
+caption says which: motion smears the first, not the second.
 """
 
 from __future__ import annotations
@@ -51,20 +51,12 @@ def light_panel(light: Pictures, frame: int, frame_rate_hz: float | None) -> Pic
 
 
 def over(window: int) -> str:
-    """How many frames a picture is of, in words.
-
-    >>> over(41), over(1)
-    ('mean of 41 frames', 'one frame')
-    """
+    """Frames of a picture, in words: `mean of 41 frames`, `one frame`."""
     return "one frame" if window == 1 else f"mean of {window} frames"
 
 
 def instant(frame: int, frame_rate_hz: float | None) -> str:
-    """The middle of a frame by its number, and by the camera's clock where its rate is known.
-
-    >>> instant(187, 40_000.0), instant(187, None)
-    ('frame 187, 4.69 ms', 'frame 187')
-    """
+    """The middle of a frame by its number, and by the camera's clock where its rate is known: `frame 187, 4.69 ms`."""
     return f"frame {frame}" + ("" if frame_rate_hz is None else f", {1e3 * (frame + 0.5) / frame_rate_hz:.2f} ms")
 
 

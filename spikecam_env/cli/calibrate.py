@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import tyro
 
-from spikecam_env.cli.options import Positive
+from spikecam_env.numbers import Positive
 
 if TYPE_CHECKING:
     from spikecam_env.calibration.findings import Finding

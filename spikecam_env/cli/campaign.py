@@ -9,8 +9,9 @@ from typing import TYPE_CHECKING, Annotated
 import tyro
 
 from spikecam_env.cli.camera import CameraOptions
-from spikecam_env.cli.options import Count, Positive, Seed, Size, Whole
+from spikecam_env.cli.options import Size
 from spikecam_env.cli.reading import ReadingOptions
+from spikecam_env.numbers import Count, Positive, Seed, Whole
 
 if TYPE_CHECKING:
     from spikecam_env.campaign import Campaign
@@ -35,8 +36,8 @@ class Simulate:
     seed: Seed = 0
     """Seed of the unit: its fixed pattern, and the noise of all recordings."""
     recording: Annotated[Repeated, tyro.conf.arg(metavar="KIND[:PARAM=VALUE,...]")] = ()
-    """What to record instead of the standard design (dark, nine flats, step, bars, disk), which `standard` stands for;
-    kinds: dark, flat, step, bars, disk or masked_rows, e.g. flat:radiance=0.3,use=holdout; may be repeated."""
+    """A recording, in place of the standard design (dark, nine flats, step, bars, disk; name `standard` to add to it).
+    Kinds: dark, flat, step, bars, disk or masked_rows, e.g. flat:radiance=0.3,use=holdout; may be repeated."""
     second_v_d: float | None = None
     """Record the dark and flats to fit at this V_D - V_ref too, in volts."""
 
@@ -79,7 +80,7 @@ class Import:
     table: Path | None = None
     """CSV table of labels: file, radiance; name, use, v_d, temperature_k, note and options of reading if wanted."""
     label: Annotated[Repeated, tyro.conf.arg(metavar="FILE=RADIANCE")] = ()
-    """What a recording was shown: a radiance (0 is dark), an .npz of light over time, `unknown` for a static scene, or
+    """The light of a recording: a radiance (0 is dark), an .npz of light over time, `unknown` for a static scene, or
     `relative` for flat maps; may be repeated."""
     frame_rate_hz: Positive | None = None
     """Frames a second; needed where the files do not say."""
@@ -133,7 +134,7 @@ class Campaigns:
 
 
 def report(campaign: Campaign) -> None:
-    """Print what is in a campaign."""
+    """Print the recordings of a campaign."""
     from spikecam_env.cli.table import table
 
     rows = [

@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 import tyro
 
 from spikecam_env.cli.camera import CameraOptions
-from spikecam_env.cli.options import Count, Seed, Size, Whole, Workers
+from spikecam_env.cli.options import Size
+from spikecam_env.numbers import Count, Seed, Whole, Workers
 
 if TYPE_CHECKING:
     from spikecam_env.datasets import Plan
@@ -17,7 +18,7 @@ if TYPE_CHECKING:
 
 @dataclass
 class DatasetOptions:
-    """What every dataset has."""
+    """Options of every dataset."""
 
     out: Path
     """Folder for the dataset; a run that was stopped goes on in it."""
@@ -52,7 +53,7 @@ class DatasetOptions:
         }
 
     def make(self, plan: Plan) -> None:
-        """Make it and say what was done."""
+        """Make the dataset, and print the number of its scenes."""
         from spikecam_env.datasets import build
 
         built = build(plan, self.out, jobs=self.jobs, ray=self.ray, progress=True)

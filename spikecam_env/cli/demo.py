@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+import os
+import sys
+import webbrowser
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from spikecam_env.cli.camera import CameraOptions
 from spikecam_env.cli.mode_weights import Mode
-from spikecam_env.cli.options import Count, Rpm, Seed, Size
+from spikecam_env.cli.options import Size
+from spikecam_env.numbers import Count, Rpm, Seed
 
 if TYPE_CHECKING:
     from spikecam_env.cli.showcase import Streamed
@@ -49,13 +53,12 @@ class Demo:
 
     def run(self) -> None:
         from spikecam_env.cli.files import out_folder
-        from spikecam_env.cli.viewer import show_file
 
         with out_folder(self.out) as folder:
             lines = self._picture(folder) if self.quick else self._film(folder)
         print("\n".join(lines))
         shown = self.out / ("demo.png" if self.quick else "demo.mp4")
-        if self.open and show_file(shown):
+        if self.open and _opened(shown):
             print(f"opened {shown}")
 
     def _streamed(self, frames: int, least: int) -> Streamed:
@@ -104,3 +107,10 @@ class Demo:
         write_json(folder / "demo.json", {"options": options, "speed": speed, "table": rows})
         wrote = f"wrote {self.out / 'demo.mp4'}, and demo.png and demo.json beside it"
         return [table(rows), "", table([speed]), wrote]
+
+
+def _opened(path: Path) -> bool:
+    """Open a file as the desktop does; False where nobody would see it: without a terminal, or without a display."""
+    remote = sys.platform == "darwin" and "SSH_CONNECTION" in os.environ
+    bare = sys.platform == "linux" and not any(os.environ.get(name) for name in ("DISPLAY", "WAYLAND_DISPLAY"))
+    return sys.stdout.isatty() and not (remote or bare) and webbrowser.open(path.absolute().as_uri())

@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Any, Literal
 import tyro
 
 from spikecam_env.cli.mode_weights import Mode
-from spikecam_env.cli.options import Count
 from spikecam_env.cli.reading import ReadingOptions
+from spikecam_env.numbers import Count
 
 if TYPE_CHECKING:
     import numpy as np

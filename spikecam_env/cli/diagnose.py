@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import tyro
 
 from spikecam_env.cli.effect_files import EffectFiles
-from spikecam_env.cli.options import Effort, Seed, Workers
+from spikecam_env.numbers import Effort, Seed, Workers
 
 if TYPE_CHECKING:
     from spikecam_env.gap.result import Diagnosis
@@ -96,14 +96,14 @@ class Diagnose:
 
 
 def summary(diagnosis: Diagnosis) -> str:
-    """The verdict, what was found with its parameters, and the gap, for a terminal."""
+    """The verdict, effects with their parameters, and the gap, for a terminal."""
     from spikecam_env.cli.table import table
     from spikecam_env.gap.report.sentence import gap_line
 
     parts = [f"{diagnosis.verdict}: {diagnosis.sentence}"]
-    found = _found(diagnosis)
-    if found:
-        parts += ["", table(found)]
+    rows = _rows(diagnosis)
+    if rows:
+        parts += ["", table(rows)]
     if diagnosis.not_bounded and diagnosis.verdict == "none":
         parts += [f"no bound from these recordings: {', '.join(name for name, _ in diagnosis.not_bounded)}"]
     if diagnosis.class_ and diagnosis.class_.get("experiment"):
@@ -114,7 +114,7 @@ def summary(diagnosis: Diagnosis) -> str:
     return "\n".join(parts)
 
 
-def _found(diagnosis: Diagnosis) -> list[dict[str, Any]]:
+def _rows(diagnosis: Diagnosis) -> list[dict[str, Any]]:
     """A row a parameter: of effects, of present parameters that are off, or of bounds where nothing was found."""
     from spikecam_env.gap.report.quantities import at_most, bounded_parameter, interval, quantity
     from spikecam_env.gap.report.words import bare, parameter_unit

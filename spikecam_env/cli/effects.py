@@ -1,4 +1,4 @@
-"""`spikecam effects`: the catalogue of effects, from their own declarations, and the beginning of a new one."""
+"""`spikecam effects`: the catalogue of effects, from their own declarations, and files for a new one."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ class List:
 
 @dataclass
 class Show:
-    """All about one effect: its law, parameters, where it is seen, what looks like it, its source.
+    """All about one effect: its law, parameters, where it is seen, its twins, its source.
 
     example:  spikecam effects show dead_time
     """

@@ -1,8 +1,10 @@
 """Where the `spikecam` command begins and ends: signals, standard streams, exit codes.
 
-0    done                          130, 143, 129   stopped by SIGINT, SIGTERM, SIGHUP (`spikecam_env.stopping`)
-1    an error of this package      141             whoever read the output has closed it
-2    unusable input, or a fault of the disk, said in one line
+- 0: done;
+- 1: an error of this package;
+- 2: unusable input, or a fault of the disk, in one line;
+- 130, 143, 129: stopped by SIGINT, SIGTERM, SIGHUP (`spikecam_env.stopping`);
+- 141: the reader of the output has closed it.
 """
 
 from __future__ import annotations
@@ -10,9 +12,9 @@ from __future__ import annotations
 import os
 import select
 import sys
-from contextlib import suppress
 
 from spikecam_env import stopping
+from spikecam_env.cli.say import say
 
 UNREAD = 141
 """Exit code of a command that a closed pipe ends, 128 + SIGPIPE."""
@@ -46,14 +48,6 @@ def _with_streams(args: list[str] | None) -> int:
     return _flushed(code)
 
 
-def say(text: str) -> None:
-    """Write a line on standard error.  Nothing is written to a closed stream, or once a signal has come."""
-    if stopping.is_stopping():
-        return
-    with suppress(OSError, ValueError):  # ValueError: a user's code has closed the stream
-        print(f"spikecam: {text}", file=sys.stderr, flush=True)
-
-
 def _is_unread() -> bool:
     """Whether it is our own output that nobody reads any more."""
     if not hasattr(select, "poll"):
@@ -65,7 +59,7 @@ def _is_unread() -> bool:
 
 
 def _flushed(code: int) -> int:
-    """The exit code, once what was printed has been written; output that nobody takes is dropped."""
+    """Write all printed text; returns the exit code.  Output that nobody takes is dropped."""
     if sys.stdout.closed:  # by a user's code, which the command has refused
         return code
     try:

@@ -9,14 +9,13 @@ from typing import Annotated
 
 import tyro
 
-from spikecam_env.checked import checked_count
 from spikecam_env.cli.evaluate_agents import Agents
 from spikecam_env.cli.evaluate_spikezoo import SpikeZoo
 from spikecam_env.cli.evaluate_tables import StillScenes, Table1, Table2, Table3, Table4
 from spikecam_env.cli.evaluate_tasks import Tasks
 from spikecam_env.cli.evaluate_truth import EvaluateTruth
 from spikecam_env.cli.mode_weights import Mode, ModeWeights
-from spikecam_env.cli.options import Checked, Seed
+from spikecam_env.numbers import Seed, WholeRange
 
 
 @dataclass
@@ -30,24 +29,19 @@ class Quick:
 
     out: Path | None = None
     """Folder for evaluate.json and evaluate.txt."""
-    paper: Path | None = None
-    """Weights of the `paper` mode to evaluate instead of the shipped ones."""
-    best: Path | None = None
-    """Weights of the `best` mode to evaluate instead of the shipped ones."""
-    fast: Path | None = None
-    """Weights of the `fast` mode to evaluate instead of the shipped ones."""
     modes: tuple[Mode, ...] = ("paper", "best")
     """Modes to evaluate."""
-    scenes: Annotated[int, Checked(checked_count, most=1000)] = 2
+    scenes: Annotated[int, WholeRange(1, 1000)] = 2
     """Scenes in each class of speed and light; the same count again gives a finer mean."""
     seed: Seed = 0
     """Seed of the held-out scenes, cameras and noise."""
+    weights: ModeWeights = field(default_factory=ModeWeights)
 
     def run(self) -> None:
         from denoiser.evaluate import evaluate_quick, report
         from spikecam_env.cli.files import out_folder
 
-        weights = ModeWeights(self.paper, self.best, self.fast).by_mode()
+        weights = self.weights.by_mode()
         with nullcontext() if self.out is None else out_folder(self.out) as folder:
             result = evaluate_quick(self.modes, weights=weights, scenes_a_class=self.scenes, seed=self.seed, out=folder)
         print(report(result), end="")

@@ -1,4 +1,4 @@
-"""`spikecam evaluate agents`: how well agents learn the tasks, by what they see."""
+"""`spikecam evaluate agents`: how well agents learn the tasks, by observation."""
 
 from __future__ import annotations
 
@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import tyro
 
-from spikecam_env.checked import checked_count, checked_whole
-from spikecam_env.cli.options import Checked, Count, Size, Workers
+from spikecam_env.cli.options import Size
+from spikecam_env.numbers import Count, WholeRange, Workers
 
 if TYPE_CHECKING:
     from spikecam_env.agents.study import StudyRun
@@ -42,7 +42,7 @@ class Agents:
         "frame1000",
         "tracker",
     )
-    """What agents see: tfp, tfi, spikes, rate (denoised), dim_rate (the same, brighter), clean (no noise), frame30,
+    """Observations: tfp, tfi, spikes, rate (denoised), dim_rate (the same, brighter), clean (no noise), frame30,
     frame1000.  Without training: tracker (classical, sees tfp), tracker-rate, tracker-clean; shipped (the task's
     shipped agent, trained on tfp, sees it), shipped-rate, shipped-clean."""
     intervals: tuple[float, ...] = ()
@@ -53,13 +53,13 @@ class Agents:
     """Rows and columns of the camera.  Default: those of the id."""
     imitate: bool = False
     """Learn to act like the oracle, instead of from rewards (as of `train-agent`)."""
-    seeds: Annotated[int, Checked(checked_count, most=MOST_SEEDS)] = 5
+    seeds: Annotated[int, WholeRange(1, MOST_SEEDS)] = 5
     """Trainings of each task and observation, with different seeds."""
-    first_seed: Annotated[int, Checked(checked_whole, least=0, most=10**9)] = 0
+    first_seed: Annotated[int, WholeRange(0, 10**9)] = 0
     """The first of these seeds; the others follow it."""
     steps: Count | None = None
     """Training steps.  Default: as many as the shipped agents had."""
-    episodes: Annotated[int, Checked(checked_count, most=MOST_EPISODES)] | None = None
+    episodes: Annotated[int, WholeRange(1, MOST_EPISODES)] | None = None
     """Test episodes that make up a score.  Default: 100 of Catch, 50 of Saccade, 10 of Track."""
     jobs: Workers = 1
     """Trainings to run at the same time, each in a process of its own."""

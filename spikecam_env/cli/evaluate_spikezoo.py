@@ -9,7 +9,7 @@ from pathlib import Path
 import tyro
 
 from spikecam_env.cli.mode_weights import Mode, ModeWeights
-from spikecam_env.cli.options import Positive
+from spikecam_env.numbers import Positive
 
 
 @dataclass

@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import tyro
 
-from spikecam_env.checked import checked_count, checked_number
-from spikecam_env.cli.options import Checked, Count, Size, Workers
+from spikecam_env.cli.options import Size
 from spikecam_env.errors import InputError
+from spikecam_env.numbers import Count, Range, WholeRange, Workers
 
 if TYPE_CHECKING:
     from denoiser.evaluate.rows import Weights
@@ -22,17 +22,9 @@ FASTEST = 100.0
 """Pixels a frame; a picture of 400 is crossed in 4 frames."""
 
 
-def _each(values: tuple[float, ...], name: str, least: float, most: float) -> None:
-    """Raises InputError for no numbers, and for one that is out of range."""
-    if not values:
-        raise InputError(f"{name} has no value; give one or more")
-    for value in values:
-        checked_number(value, name, least, most)
-
-
 @dataclass
 class TableOptions:
-    """What every table has."""
+    """Options of every table."""
 
     out: Path | None = None
     """Folder for the table as text, JSON and a page of pictures; a run that was stopped goes on in it."""
@@ -52,6 +44,11 @@ class TableOptions:
     jobs: Workers = 1
     """Worker processes, one thread each; 1 works in this one, with all threads."""
 
+    @property
+    def table(self) -> str:
+        """Its name: `table1`, ..., `still`."""
+        return type(self).__name__.lower().removesuffix("scenes")
+
     def given(self) -> Weights:
         """The files that were given."""
         from denoiser.evaluate.rows import Weights
@@ -61,15 +58,15 @@ class TableOptions:
             raise InputError(f"--weights {self.weights}: there is no such folder")
         return Weights.found(self.weights, {name: path for name, path in given.items() if path is not None})
 
-    def show(self, table: str, **options: Any) -> None:
-        """Make a table and print it."""
+    def show(self, **options: Any) -> None:
+        """Make the table and print it."""
         from denoiser.evaluate.table_report import report
         from denoiser.evaluate.tables import TableRequest, evaluate_table
 
-        asked = TableRequest(out=self.out, rows=self.rows, jobs=self.jobs, weights=self.given(), **options)
-        print(report(evaluate_table(table, asked, progress=True)), end="")
+        request = TableRequest(out=self.out, rows=self.rows, jobs=self.jobs, weights=self.given(), **options)
+        print(report(evaluate_table(self.table, request, progress=True)), end="")
         if self.out is not None:
-            print(f"wrote {table}.txt, {table}.json and {table}.png in {self.out}")
+            print(f"wrote {self.table}.txt, {self.table}.json and {self.table}.png in {self.out}")
 
 
 @dataclass
@@ -80,23 +77,21 @@ class OnScenes(TableOptions):
     """Other scenes of the catalogue; `spikecam scenes` lists them."""
     size: Size = (250, 400)
     """Rows and columns."""
-    seeds: Annotated[int, Checked(checked_count, most=MOST_SCENES)] = 3
+    seeds: Annotated[int, WholeRange(1, MOST_SCENES)] = 3
     """Cameras before each scene, each with a fixed pattern and noise of its own; their spread is printed."""
-    intervals: Annotated[tuple[float, ...], Checked(_each, least=SHORTEST, most=LONGEST)] = (10.0,)
+    intervals: Annotated[tuple[float, ...], Range(SHORTEST, LONGEST)] = (10.0,)
     """Mean intervals between spikes [frames], each a group of the table; 3 10 40 100 go from bright to dim."""
-    speeds: Annotated[tuple[float, ...], Checked(_each, least=0.0, most=FASTEST)] = (0.0,)
+    speeds: Annotated[tuple[float, ...], Range(0.0, FASTEST)] = (0.0,)
     """Speeds of the motion [pixels a frame], each a group of the table; 0 is the scene's own speed."""
     frames: Count | None = None
     """Frames of each stream, whose middle one is the picture; by default as many as the interval asks for."""
     data: Path | None = None
     """Dataset of `spikecam dataset phm-n` to take streams from, instead of simulating them."""
 
-    def make(self, table: str) -> None:
-        """Make a table on PHM_N and print it."""
+    def run(self) -> None:
         from denoiser.evaluate.phm import SCENES
 
         self.show(
-            table,
             scenes=self.scenes or SCENES,
             shape=self.size,
             seeds=self.seeds,
@@ -114,9 +109,8 @@ class OnRecordings(TableOptions):
     recordings: Path | None = None
     """Folder of the real recordings, with wall.npz and helicopter_low_light.npz."""
 
-    def make(self, table: str) -> None:
-        """Make a table on real recordings and print it."""
-        self.show(table, **({} if self.recordings is None else {"real": self.recordings}))
+    def run(self) -> None:
+        self.show(**({} if self.recordings is None else {"real": self.recordings}))
 
 
 @dataclass
@@ -126,9 +120,6 @@ class Table1(OnScenes):
     example:  spikecam evaluate table1 --jobs 2 --out evaluation
     """
 
-    def run(self) -> None:
-        self.make("table1")
-
 
 @dataclass
 class Table2(OnRecordings):
@@ -136,9 +127,6 @@ class Table2(OnRecordings):
 
     example:  spikecam evaluate table2 --out evaluation
     """
-
-    def run(self) -> None:
-        self.make("table2")
 
 
 @dataclass
@@ -148,9 +136,6 @@ class Table3(OnScenes):
     example:  spikecam evaluate table3 --jobs 2 --out evaluation
     """
 
-    def run(self) -> None:
-        self.make("table3")
-
 
 @dataclass
 class Table4(OnRecordings):
@@ -158,9 +143,6 @@ class Table4(OnRecordings):
 
     example:  spikecam evaluate table4 --out evaluation
     """
-
-    def run(self) -> None:
-        self.make("table4")
 
 
 @dataclass
@@ -170,14 +152,14 @@ class StillScenes(TableOptions):
     example:  spikecam evaluate still --out evaluation
     """
 
-    scenes: Annotated[int, Checked(checked_count, most=MOST_SCENES)] = 2
+    scenes: Annotated[int, WholeRange(1, MOST_SCENES)] = 2
     """Scenes at each of two light levels."""
     size: Size = (96, 96)
     """Rows and columns."""
-    seeds: Annotated[int, Checked(checked_count, most=MOST_SCENES)] = 3
+    seeds: Annotated[int, WholeRange(1, MOST_SCENES)] = 3
     """Cameras before each scene."""
     frames: Count = 400
     """Frames whose mean is judged."""
 
     def run(self) -> None:
-        self.show("still", still_scenes=self.scenes, shape=self.size, seeds=self.seeds, frames=self.frames)
+        self.show(still_scenes=self.scenes, shape=self.size, seeds=self.seeds, frames=self.frames)

@@ -1,4 +1,4 @@
-"""`spikecam evaluate tasks`: the ends of every task's score, what the oracle does and what doing nothing does."""
+"""`spikecam evaluate tasks`: the ends of every task's score, the oracle's and that of doing nothing."""
 
 from __future__ import annotations
 
@@ -8,9 +8,9 @@ from typing import Annotated
 
 import tyro
 
-from spikecam_env.checked import checked_count
-from spikecam_env.cli.options import Checked, Seed, Size
+from spikecam_env.cli.options import Size
 from spikecam_env.errors import unknown_name
+from spikecam_env.numbers import Seed, WholeRange
 
 MOST_EPISODES = 1000
 """As many as the test split has."""
@@ -33,7 +33,7 @@ class Tasks:
     """Which tasks or scenes to play, e.g. Track-v1 or Fan-v0."""
     scenes: bool = False
     """Play every scene of the catalogue too, at 64 x 64; a 3-D scene takes 15 to 100 ms a step."""
-    episodes: Annotated[int, Checked(checked_count, most=MOST_EPISODES)] = 20
+    episodes: Annotated[int, WholeRange(1, MOST_EPISODES)] = 20
     """Episodes that each policy plays; the table has their mean."""
     seed: Seed = 0
     """Seed of the first episode; each further episode has the next number."""

@@ -7,9 +7,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Annotated
 
-from spikecam_env.checked import checked_count
 from spikecam_env.cli.mode_weights import Mode, ModeWeights
-from spikecam_env.cli.options import Checked, Seed
+from spikecam_env.numbers import Seed, WholeRange
 
 
 @dataclass
@@ -25,12 +24,12 @@ class EvaluateTruth:
     static: Path | None = None
     """A recording of a scene at rest: one half is denoised, the mean of the other is the truth."""
     moving: Path | None = None
-    """A recording in which everything moves: what stays at a pixel is the camera's own pattern."""
+    """A recording in which everything moves: a pattern that stays is the camera's own."""
     out: Path | None = None
     """Folder for truth.json and truth.txt."""
     modes: tuple[Mode, ...] = ("paper", "best")
     """Modes to evaluate."""
-    scenes: Annotated[int, Checked(checked_count, most=1000)] = 1
+    scenes: Annotated[int, WholeRange(1, 1000)] = 1
     """Simulated scenes for each camera, and in each class of speed and light."""
     seed: Seed = 0
     """Seed of the simulated scenes, cameras and noise."""

@@ -8,7 +8,7 @@ from typing import Annotated, Literal
 
 import tyro
 
-from spikecam_env.cli.options import Count, Positive
+from spikecam_env.numbers import Count, Positive
 
 
 @dataclass

@@ -12,14 +12,15 @@ import tyro
 
 from spikecam_env.checked import LARGEST_COUNT
 from spikecam_env.cli.camera import CameraOptions
-from spikecam_env.cli.options import Count, Positive, Seed, Size, Whole
+from spikecam_env.cli.options import Size
 from spikecam_env.errors import InputError
+from spikecam_env.numbers import Count, Positive, Seed, Whole
 
 if TYPE_CHECKING:
     from scenes import VideoScene
 
 MOST_OFF = 0.25
-"""Share by which spikes may differ from what the mean interval asks without a warning; four standard deviations of
+"""Share by which spikes may differ from their expected number without a warning; four standard deviations of
 their number come to it."""
 
 
@@ -44,7 +45,7 @@ class FilmToSpikes:
     slow: Positive = 1.0
     """Factor of slow motion: the film's time stamps are divided by it."""
     transfer: str | None = None
-    """From its values to linear light: srgb, bt709, gamma2.2 (or another power), linear, pq, hlg; default: what the
+    """From its values to linear light: srgb, bt709, gamma2.2 (or another power), linear, pq, hlg; default: as the
     file states."""
     channel: Literal["luminance", "red", "green", "blue"] = "luminance"
     """Colour to take as light: luminance, or one channel."""
@@ -74,7 +75,7 @@ class FilmToSpikes:
         check_out(self.out, self.frames or 1, self.size, self.truth_every)
         model = self.camera.load()
         sensor = SpikeSensor(model, self.size, self.seed, engine="auto")
-        asked = self._frames_asked(model.frame_rate_hz)
+        limit = self._limit(model.frame_rate_hz)
         scene = VideoScene(
             self.film,
             self.film_rate,
@@ -84,10 +85,10 @@ class FilmToSpikes:
             channel=self.channel,
             interpolation=self.interpolation,
             slow=self.slow,
-            seconds=None if asked is None else asked / model.frame_rate_hz,
+            seconds=None if limit is None else limit / model.frame_rate_hz,
             mean_interval=self.mean_interval,
         )
-        frames = self._frames(asked, scene)
+        frames = self._frames(limit, scene)
         check_out(self.out, frames, self.size)
         attributes: dict[str, object] = {"model": model.name, "seed": self.seed, "scene": repr(scene)}
         attributes |= {"film": self.film.name, "transfer": scene.transfer, "gain": scene.gain}
@@ -97,8 +98,8 @@ class FilmToSpikes:
         done = self._done(scene, frames, sensor.engine, spikes)
         print(table([{"film to spikes": name, "": value} for name, value in done.items()]))
 
-    def _frames_asked(self, rate_hz: float) -> int | None:
-        """Errors: InputError for less than one, and where both options say it."""
+    def _limit(self, rate_hz: float) -> int | None:
+        """Frames to record, where an option says so."""
         if self.frames is not None and self.seconds is not None:
             raise InputError(f"--frames {self.frames} --seconds {self.seconds:g}; give one of the two")
         if self.seconds is not None and not self.seconds * rate_hz <= LARGEST_COUNT:
@@ -108,19 +109,19 @@ class FilmToSpikes:
             raise InputError(f"{asked} frames are asked; record at least 1")
         return asked
 
-    def _frames(self, asked: int | None, scene: VideoScene) -> int:
-        """How many to record.  Errors: InputError where the film is shorter."""
+    def _frames(self, limit: int | None, scene: VideoScene) -> int:
+        """Frames to record; raises InputError where the film is shorter."""
         whole = math.floor(scene.frames + 1e-6)
         if whole < 1:
             raise InputError(f"{self.film} lasts {scene.frames:.3g} frames of the camera; it must last 1 or more")
-        if asked is not None and asked > whole:
+        if limit is not None and limit > whole:
             raise InputError(
-                f"{asked} frames are asked; {self.film} lasts {whole} ({scene.frames / scene.frame_rate_hz:.4g} s)"
+                f"{limit} frames are asked; {self.film} lasts {whole} ({scene.frames / scene.frame_rate_hz:.4g} s)"
             )
-        return whole if asked is None else asked
+        return whole if limit is None else limit
 
     def _warn_if_off(self, pixels: int, spikes: int) -> None:
-        """Say where spikes are far from the mean interval that was asked.  pixels: of all frames together."""
+        """Warn where spikes are far from the mean interval.  `pixels` are those of all frames together."""
         asked = pixels / self.mean_interval
         if abs(spikes - asked) <= MOST_OFF * asked + 4.0 * math.sqrt(asked):
             return

@@ -1,4 +1,7 @@
-"""The words of a command line, before its values are read: what to begin with, and what a wrong word may have meant."""
+"""Names of commands and options on a command line, before its values are read: a wrong one suggests the right one.
+
+tyro's own errors are boxes of many lines; those of this command are one.
+"""
 
 from __future__ import annotations
 
@@ -25,83 +28,72 @@ Three commands to begin with:
 ALWAYS = ("help",)
 """Options of every command."""
 OF_THE_PARSER = "tyro-"
-"""How the names of options begin that the parser adds, such as --tyro-print-completion."""
+"""Prefix of the options that the parser adds, such as --tyro-print-completion."""
 APPENDS = get_args(tyro.conf.UseAppendAction[str])[1]
 """Marks options that may be repeated."""
 
 
 def check_words(args: Sequence[str], commands: Mapping[str, type]) -> None:
-    """Raises InputError for the first word that is no command, and for the first option that the command does not have,
-    or that is given more than once and may not be.
+    """Check names of commands and options.
 
-    args: the command line, without the program's name.  commands: the class of options of each command, which may hold
-    commands of its own.
+    Args:
+        args: the command line, without the program's name.
+        commands: the class of options of each command, which may hold commands of its own.
+
+    Raises:
+        InputError: a word is no command, the command does not have an option, or one is given twice and may not be.
     """
-    said, choices, options = "spikecam", dict(commands), set(ALWAYS)
+    said, choices, options = "spikecam", dict(commands), dict.fromkeys(ALWAYS, False)
     given: list[str] = []
-    repeatable: set[str] = set()
     for word in args:
         if choices and not word.startswith("-"):
             if word not in choices:
-                raise _unknown_command(said, word, choices)
+                raise _unknown("command", word, f"`{said}`", choices)
             chosen = choices[word]
-            said, choices, options = f"{said} {word}", commands_of(chosen), set(ALWAYS).union(options_of(chosen))
-            repeatable = repeatable_of(chosen)
+            said, choices = f"{said} {word}", commands_of(chosen)
+            options = {**dict.fromkeys(ALWAYS, False), **options_of(chosen)}
         elif word.startswith("--") and not choices:
             name = word[2:].partition("=")[0].replace("_", "-")
             if name and name not in options and not name.startswith(OF_THE_PARSER):
-                raise _unknown_option(said, name, options)
+                raise _unknown("option", name, f"`{said}`", options)
             switch = name.removeprefix("no-") if f"no-{name.removeprefix('no-')}" in options else name
-            if switch not in repeatable:
+            if not options.get(switch):
                 given.append(f"--{switch}")
     each_once(given, f"`{said}`")
 
 
-def _unknown_command(said: str, word: str, choices: Iterable[str]) -> InputError:
-    names = sorted(choices)
-    nearest = get_close_matches(word, names, n=1)
-    meant = f"did you mean {nearest[0]}?" if nearest else f"choose one of {', '.join(names)};"
-    return InputError(f"unknown command {shown(word)}; {meant} `{said} --help` lists them")
-
-
-def _unknown_option(said: str, name: str, options: Iterable[str]) -> InputError:
-    nearest = get_close_matches(name, sorted(options), n=1)
-    meant = f"; did you mean --{nearest[0]}?" if nearest else ";"
-    return InputError(f"unknown option {shown('--' + name)} of `{said}`{meant} `{said} --help` lists them")
+def _unknown(kind: str, name: str, of: str, allowed: Iterable[str]) -> InputError:
+    nearest = get_close_matches(name, sorted(allowed), n=1)
+    dashes = "--" if kind == "option" else ""
+    if nearest:
+        hint = f"did you mean {dashes}{nearest[0]}? "
+    else:
+        hint = "" if dashes else f"choose one of {', '.join(sorted(allowed))}; "
+    place = f" of {of}" if dashes else ""
+    return InputError(f"unknown {kind} {shown(dashes + name)}{place}; {hint}{of[:-1]} --help` lists them")
 
 
 def commands_of(options: type) -> dict[str, type]:
     """Commands below a command, by their names; none of most."""
-    found: dict[str, type] = {}
+    commands: dict[str, type] = {}
     for hint in get_type_hints(options, include_extras=True).values():
         for part in get_args(hint):
             if get_origin(part) is Annotated and is_dataclass(get_args(part)[0]):
                 kind, *marks = get_args(part)
-                found |= {mark.name: kind for mark in marks if getattr(mark, "name", None)}
-    return found
+                commands |= {mark.name: kind for mark in marks if getattr(mark, "name", None)}
+    return commands
 
 
-def repeatable_of(options: Any) -> set[str]:
-    """Names of those options of a command that may be given more than once, each time another value."""
+def options_of(options: Any) -> dict[str, bool]:
+    """A command's options, as they are written after the two dashes: whether each may be repeated."""
     hints = get_type_hints(options, include_extras=True)
-    names: set[str] = set()
-    for field in fields(options):
-        hint = hints[field.name]
-        if is_dataclass(hint):
-            names |= repeatable_of(hint)
-        elif APPENDS in get_args(hint):
-            names.add(field.name.replace("_", "-"))
-    return names
-
-
-def options_of(options: Any) -> set[str]:
-    """Names of a command's options, as they are written after the two dashes."""
-    hints = get_type_hints(options, include_extras=True)
-    names: set[str] = set()
+    names: dict[str, bool] = {}
     for field in fields(options):
         hint, name = hints[field.name], field.name.replace("_", "-")
         if is_dataclass(hint):
             names |= options_of(hint)
         elif tyro.conf.Positional not in get_args(hint):
-            names |= {name, f"no-{name}"} if hint is bool else {name}
+            names[name] = APPENDS in get_args(hint)
+            if hint is bool:
+                names[f"no-{name}"] = False
     return names

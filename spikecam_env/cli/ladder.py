@@ -8,12 +8,12 @@ from pathlib import Path
 import tyro
 
 from spikecam_env.cli.effect_files import EffectFiles
-from spikecam_env.cli.options import Seed, Workers
+from spikecam_env.numbers import Seed, Workers
 
 
 @dataclass
 class LadderCommand:
-    """Add what a model lacks, one effect after another, and show the gap fall: ladder.json, ladder.png, model.toml.
+    """Add effects that a model lacks, one after another, and show the gap fall: ladder.json, ladder.png, model.toml.
 
     example:  spikecam ladder camera-17 --model ideal --out ladder
     """

@@ -10,12 +10,12 @@ from typing import TYPE_CHECKING, Annotated
 
 import tyro
 
-from spikecam_env.checked import checked_number
 from spikecam_env.cli.camera import CameraOptions
 from spikecam_env.cli.mode_weights import Mode
-from spikecam_env.cli.options import Checked, Count, Positive, Rpm, Seed, Size
+from spikecam_env.cli.options import Size
 from spikecam_env.cli.reading import ReadingOptions
 from spikecam_env.errors import InputError, unknown_name
+from spikecam_env.numbers import Count, Positive, Range, Rpm, Seed
 
 if TYPE_CHECKING:
     from spikecam_env.streams.sources import Source
@@ -42,16 +42,16 @@ class Live:
     """A scene of `spikecam scenes`; a file as `spikecam denoise` takes it; packed frames from standard input (-), a
     server (tcp://HOST:PORT, unix://PATH), a named pipe or a socket by its path."""
     film: Path | None = None
-    """Write a film (.mp4) of what a window would show; it is kept when the stream, or --seconds, is over."""
+    """Write a film (.mp4) instead of opening a window; it is kept when the stream, or --seconds, is over."""
     frames: Count | None = None
     """End after so many frames."""
     seconds: Positive | None = None
     """End after so long."""
-    speed: Annotated[float | None, Checked(checked_number, least=SLOWEST, most=FASTEST)] = None
+    speed: Annotated[float | None, Range(SLOWEST, FASTEST)] = None
     """Speed of a file or a scene.  Default: 1, real time, the camera's frame rate of 40 000 frames a second."""
     loop: bool = False
     """Begin a file again when it is over."""
-    pictures: Annotated[float, Checked(checked_number, least=0.01, most=MOST_PICTURES_S)] = 30.0
+    pictures: Annotated[float, Range(0.01, MOST_PICTURES_S)] = 30.0
     """Pictures a second, at most."""
     mode: Mode = "best"
     """Which DnSS."""

@@ -17,7 +17,6 @@ from spikecam_env.cli.denoise import Denoise
 from spikecam_env.cli.diagnose import Diagnose
 from spikecam_env.cli.effect_files import effects_of
 from spikecam_env.cli.effects import Effects
-from spikecam_env.cli.entry import say
 from spikecam_env.cli.evaluate import Evaluate
 from spikecam_env.cli.export import Export
 from spikecam_env.cli.film_to_spikes import FilmToSpikes
@@ -27,11 +26,11 @@ from spikecam_env.cli.live_stream import Live
 from spikecam_env.cli.options import check_options
 from spikecam_env.cli.play import Play
 from spikecam_env.cli.record import Record
+from spikecam_env.cli.say import say, warnings_as_lines
 from spikecam_env.cli.scenes import Scenes
 from spikecam_env.cli.train import Train
 from spikecam_env.cli.train_agent import TrainAgent
 from spikecam_env.cli.view import ViewCommand
-from spikecam_env.cli.warned import warnings_as_lines
 from spikecam_env.errors import InputError
 from spikecam_env.stopping import Stopped
 from spikecam_env.version import __version__
@@ -70,15 +69,8 @@ COMMANDS: dict[str, Any] = {
 }
 
 
-def main(args: list[str] | None = None) -> None:
-    """The command, from signals to exit code (`cli.entry`)."""
-    from spikecam_env.cli.entry import main
-
-    main(args)
-
-
 def run(args: list[str] | None = None) -> int:
-    """Parse and run; returns the exit code.  Without a word it prints what to begin with; `--version`, the version."""
+    """Parse and run; returns the exit code.  Without a word it prints three commands to begin with."""
     words = sys.argv[1:] if args is None else args
     if not words:
         print(START)
@@ -90,7 +82,7 @@ def run(args: list[str] | None = None) -> int:
 
 
 def understood(words: list[str]) -> Any:
-    """The command that these words say, an instance of one of COMMANDS, not run yet; exits where there is none."""
+    """The command of a line, an instance of one of COMMANDS, not run yet; exits where there is none."""
     check_words(words, COMMANDS)
     union: Any = None
     for name, options in COMMANDS.items():

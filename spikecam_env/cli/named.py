@@ -1,4 +1,4 @@
-"""Options of the form NAME:parameter=value,parameter=value, read by the declaration of what is named."""
+"""Options of the form NAME:parameter=value,parameter=value, read by the fields of the class of that name."""
 
 from __future__ import annotations
 
@@ -10,14 +10,20 @@ from spikecam_env.errors import InputError, shown, unknown_name
 
 
 def named(text: str, catalogue: Mapping[str, type[Any]], kind: str) -> Any:
-    """One of a catalogue of dataclasses, made from text; what is not said has its default.
+    """An instance of a dataclass of a catalogue, made from text.
 
-    >>> from spikecam_env.sensor import CATALOGUE
-    >>> named("dead_time:tau_us=0.2", CATALOGUE, "effect")
-    DeadTime(tau_us=0.2)
+    Args:
+        text: name and parameters; the others have their defaults.
+        catalogue: class by name.
+        kind: of the classes, for messages.
 
-    Errors: InputError for an unknown name or parameter, a value of another type, and one that is missing
-    or given twice.
+    Raises:
+        InputError: an unknown name or parameter, a value of another type, or one that is missing or given twice.
+
+    Example:
+        >>> from spikecam_env.sensor import CATALOGUE
+        >>> named("dead_time:tau_us=0.2", CATALOGUE, "effect")
+        DeadTime(tau_us=0.2)
     """
     name, _, rest = text.partition(":")
     if name not in catalogue:

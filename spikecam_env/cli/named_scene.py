@@ -1,4 +1,4 @@
-"""What the camera looks at, as options say it."""
+"""Scenes as options name them."""
 
 from __future__ import annotations
 
@@ -11,10 +11,7 @@ if TYPE_CHECKING:
 
 
 def scene_named(name: str, shape: tuple[int, int], seed: int, frame_rate_hz: float, rpm: float | None = None) -> Scene:
-    """The disk at a speed, or another scene of the catalogue by name.
-
-    rpm: of the disk; default 2000.  Errors: InputError for an unknown name, and for rpm with another scene.
-    """
+    """The disk at a speed (default 2000 rpm), or another scene of the catalogue, which takes no rpm."""
     from scenes import RotatingDisk
     from scenes.catalogue import SCENES, make_scene
 

@@ -1,56 +1,28 @@
 """Options with a range: declared where the option stands, checked before the command runs.
 
     frames: Count = 4000
-    rpm: Annotated[float | None, Checked(checked_number, most=1e9)] = None
+    rpm: Annotated[float | None, Range(most=1e9)] = None
 
-The check is the library's own, with the option's name for the value's.  Options without a check of their own are held
-to what every one of them must be: numbers are finite, and a list names nothing twice.
+An error names the option as it is typed.  Options without a range are held to two rules: numbers are finite, and a list
+names nothing twice.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import fields, is_dataclass
 from typing import Annotated, Any, get_args, get_origin, get_type_hints
 
-from spikecam_env.checked import (
-    MOST_RPM,
-    checked_above_zero,
-    checked_count,
-    checked_number,
-    checked_seed,
-    checked_shape,
-    checked_whole,
-    each_once,
-)
-
-MOST_WORKERS = 1024
-"""Threads or processes of a command; the largest machines have some hundreds of cores."""
+from spikecam_env.checked import checked_number, checked_shape, checked_whole, each_once
+from spikecam_env.errors import InputError
+from spikecam_env.numbers import Range
 
 
-class Checked:
-    """A check of the library, `check(value, name, **limits)`, for an option's `Annotated`."""
-
-    def __init__(self, check: Callable[..., object], **limits: float) -> None:
-        self.check, self.limits = check, limits
+class _Shape:
+    check = staticmethod(checked_shape)
 
 
-Count = Annotated[int, Checked(checked_count)]
-"""1 or more."""
-Whole = Annotated[int, Checked(checked_whole, least=0)]
-"""0 or more."""
-Workers = Annotated[int, Checked(checked_count, most=MOST_WORKERS)]
-"""Threads or processes."""
-Seed = Annotated[int, Checked(checked_seed)]
-Size = Annotated[tuple[int, int], Checked(checked_shape)]
+Size = Annotated[tuple[int, int], _Shape()]
 """Rows and columns."""
-Positive = Annotated[float, Checked(checked_number, least=0.0, above=True)]
-"""A finite number above 0."""
-
-Effort = Annotated[float, Checked(checked_above_zero)]
-"""Above 0; infinite for no end."""
-Rpm = Annotated[float, Checked(checked_number, least=-MOST_RPM, most=MOST_RPM)]
-"""Turns a minute, either way."""
 
 
 def check_options(command: Any) -> None:
@@ -65,14 +37,18 @@ def check_options(command: Any) -> None:
 
 
 def _check(value: Any, hint: Any, name: str) -> None:
-    checks = [mark for mark in _marks(hint) if isinstance(mark, Checked)]
     if value is None:
         return
-    for mark in checks:
-        mark.check(value, name, **mark.limits)
-    if not checks:
+    is_list = isinstance(value, tuple) and _is_list(hint)
+    ranges = [mark for mark in _marks(hint) if isinstance(mark, Range | _Shape)]
+    if is_list and ranges and not value:
+        raise InputError(f"{name} has no value; give one or more")
+    for mark in ranges:
+        for item in value if is_list else (value,):
+            mark.check(item, name)
+    if not ranges:
         _check_finite(value, name)
-    if isinstance(value, tuple) and _is_list(hint):
+    if is_list:
         each_once(value, name)
 
 
@@ -92,7 +68,7 @@ def _is_list(hint: Any) -> bool:
 
 
 def _marks(hint: Any) -> list[Any]:
-    """What `Annotated` says of a type, also of those that it is a union of."""
+    """Marks in the `Annotated` of a type, and of the parts of a union with None."""
     if get_origin(hint) is Annotated:
         kind, *marks = get_args(hint)
         return [*marks, *_marks(kind)]

@@ -75,9 +75,13 @@ def sheet(panels: Sequence[PicturePanel], columns: int) -> NDArray[np.uint8]:
 def write_film(
     path: str | Path, frames: Iterable[NDArray[np.uint8]], fps: float = 30.0, total: int | None = None
 ) -> None:
-    """Write (rows, columns, 3) uint8 frames as an H.264 MP4; the file appears when it is complete.
+    """Write an H.264 MP4, which appears when it is complete.
 
-    total: how many frames there are, for the progress bar, where `frames` cannot say.
+    Args:
+        path: of the film.
+        frames: (rows, columns, 3) uint8 pictures.
+        fps: pictures a second.
+        total: number of frames, for the progress bar, where `frames` has no length.
     """
     with whole_file(path) as beside:
         pictures = iter(tqdm(frames, desc="film", unit="frame", total=total, leave=False))

@@ -9,10 +9,10 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import tyro
 
-from spikecam_env.checked import checked_count, checked_number
 from spikecam_env.cli.camera import CameraOptions
-from spikecam_env.cli.options import Checked, Seed, Size
+from spikecam_env.cli.options import Size
 from spikecam_env.errors import InputError
+from spikecam_env.numbers import Range, Seed, WholeRange
 
 if TYPE_CHECKING:
     import gymnasium
@@ -33,9 +33,9 @@ MOST_PICTURES = 90_000
 class Play:
     """Steer a spike camera with the keyboard, or watch a policy steer it.
 
-    In a window where there is a display; else, and with --film, a film is written.  In the window: arrow keys or WASD
-    turn the camera, 1 to 4 answer (ReadSpin), 0 to 9 answer (ReadDigit), E and Q open and close the iris (Exposure),
-    space pauses, N begins another episode, Esc ends.
+    In a window where there is a display; else, and with --film, a film is written.  In the window, arrow keys or WASD
+    turn the camera.  1 to 4 answer (ReadSpin), 0 to 9 answer (ReadDigit), E and Q open and close the iris (Exposure).
+    Space pauses, N begins another episode, Esc ends.
 
     example:  spikecam play Track-v1
               spikecam play Catch-v1 --policy oracle --denoise --film catch.mp4
@@ -48,7 +48,7 @@ class Play:
     oracle in a film."""
     film: Path | None = None
     """Write a film (.mp4) of it instead of opening a window; default where there is no display: ID.mp4."""
-    episodes: Annotated[int | None, Checked(checked_count, most=MOST_EPISODES)] = None
+    episodes: Annotated[int | None, WholeRange(1, MOST_EPISODES)] = None
     """Number of episodes; default: one in a film, no limit in a window."""
     denoise: bool = False
     """Show the online denoiser's picture too; it is 17 to 32 frames old."""
@@ -56,7 +56,7 @@ class Play:
     """Draw a ring about the target."""
     score: bool = False
     """Also play the oracle and nothing on the same episodes, and print the score: 0 is nothing's, 1 the oracle's."""
-    slow: Annotated[float, Checked(checked_number, least=1.0, most=MOST_SLOW)] = 40.0
+    slow: Annotated[float, Range(1.0, MOST_SLOW)] = 40.0
     """Times slower than life: 40 shows a millisecond of the scene, 40 frames, in 40 ms."""
     split: Literal["train", "test"] = "test"
     """Training or test episodes of a task of version 1."""

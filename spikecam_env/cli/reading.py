@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, fields
 from typing import Any, Literal
 
-from spikecam_env.cli.options import Count, Whole
+from spikecam_env.numbers import Count, Whole
 
 
 @dataclass(frozen=True)

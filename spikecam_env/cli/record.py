@@ -7,7 +7,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from spikecam_env.cli.camera import CameraOptions
-from spikecam_env.cli.options import Count, Rpm, Seed, Size, Whole
+from spikecam_env.cli.options import Size
+from spikecam_env.numbers import Count, Rpm, Seed, Whole
 
 
 @dataclass
@@ -20,7 +21,7 @@ class Record:
     out: Path
     """Output file: .h5 (bits with attributes), .dat (raw Vidar bits, geometry in .dat.json) or .npz (key `spikes`)."""
     scene: str = "disk"
-    """What the camera looks at: the rotating disk, or another scene of `spikecam scenes`."""
+    """Scene: the rotating disk, or another scene of `spikecam scenes`."""
     frames: Count = 4000
     """Spike frames to record; 40 000 are a second."""
     camera: CameraOptions = field(default_factory=CameraOptions)

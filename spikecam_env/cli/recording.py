@@ -1,4 +1,4 @@
-"""A scene through a sensor into a file, block by block: what `record` and `film` share."""
+"""A scene through a sensor into a file, block by block, for `record` and `film`."""
 
 from __future__ import annotations
 
@@ -37,8 +37,12 @@ def lit_frames(out: Path, frames: int, every: int | None) -> range:
 
 
 def check_out(out: Path, frames: int, shape: tuple[int, int], truth_every: int | None = 0) -> None:
-    """Errors: InputError for a file type that no recording has, or that has no room for truth where there is to be
-    some, a place that cannot be written to, and more frames than the disk has room for, or for a .npz the memory."""
+    """Refuse a recording that cannot be written, before the work.
+
+    Raises:
+        InputError: a file type that no recording has, or that has no room for truth; a place that cannot be written to;
+            or more frames than the disk, or for a .npz the memory, has room for.
+    """
     from spikecam_env.streams.packing import packed_bytes
     from spikecam_env.streams.side_file import side_path
 
@@ -61,21 +65,29 @@ def record_scene(
     scene: Scene,
     sensor: SpikeSensor,
     frames: int,
-    what: str,
+    title: str,
     attributes: dict[str, object],
     truth: range = range(0),
 ) -> int:
-    """Write `frames` frames of spikes to a .h5, .dat or .npz file, which appears whole; returns how many spikes.
+    """Record a scene.  Beside a .dat file, its geometry and frame rate go to `<name>.dat.json`.
 
-    Beside a .dat file, its geometry and frame rate go to `<name>.dat.json`, so that it opens without options.
+    Args:
+        out: .h5, .dat or .npz file, which appears whole.
+        scene: light of the recording.
+        sensor: camera.
+        frames: length of the recording.
+        title: for the progress bar.
+        attributes: for a .h5 file.
+        truth: frames whose ground truth is kept, in a .h5 file.
 
-    what: for the progress bar.  attributes: of a .h5 file.  truth: frames whose ground truth it has too.
+    Returns:
+        The number of spikes.
     """
     from tqdm import trange
 
     spikes = 0
     with _appending(out, scene, sensor, attributes) as (append, append_truth):
-        for start in trange(0, frames, BLOCK, desc=what, unit="block", leave=False):
+        for start in trange(0, frames, BLOCK, desc=title, unit="block", leave=False):
             count = min(BLOCK, frames - start)
             block = sensor.step(scene.radiance(start, start + count), count)
             append(block)

@@ -60,7 +60,7 @@ class DenoisedRecording:
         return min(self.light or self.film_frames, key=lambda frame: abs(frame - len(self.noisy) // 2))
 
     def panels(self, frame: int, *, light: bool = True) -> list[PicturePanel]:
-        """Before and after at a frame; light: beside the true light, where it is known."""
+        """Before and after at a frame, beside the true light where it is known and asked for."""
         known = self.light.get(frame) if light else None
         shown = [
             mean_panel("noisy spikes", self.noisy, frame, self.window, known),
@@ -105,10 +105,7 @@ class DenoisedRecording:
 
 
 def checked_window(window: int | None, frames: int) -> int:
-    """Frames of a mean: WINDOW, or as many as a shorter recording has; odd.
-
-    Raises InputError for a given one that is even, or longer than the recording.
-    """
+    """Frames of a mean: WINDOW, or as many as a shorter recording has; odd.  Raises InputError for an unusable one."""
     if window is None:
         return min(WINDOW, frames - 1 + frames % 2)
     if window % 2 == 0:
@@ -119,11 +116,7 @@ def checked_window(window: int | None, frames: int) -> int:
 
 
 def evenly(items: Sequence[int], most: int) -> list[int]:
-    """At most so many of the items, evenly over them.
-
-    >>> evenly(range(10), 3)
-    [0, 4, 8]
-    """
+    """At most so many of the items, evenly over them: of `range(10)` three are 0, 4, 8."""
     return list(items[:: -(-len(items) // most) or 1])
 
 
@@ -140,7 +133,7 @@ def whole_windows(frames: int, window: int) -> range:
 def light_at(path: Path, frames: Sequence[int], shape: tuple[int, int]) -> dict[int, Pictures]:
     """True light of a recording in the middle of some of these frames, at most MOST_JUDGED, by frame.
 
-    Empty for a file that is not of this package or has none.  Raises InputError where it is damaged.
+    Empty for a file that is not of this package or has no truth.
     """
     if path.suffix.lower() not in HDF5 or not is_recording(path):
         return {}

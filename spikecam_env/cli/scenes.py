@@ -1,4 +1,4 @@
-"""`spikecam scenes`: what there is to look at; pictures of it and films."""
+"""`spikecam scenes`: the catalogue of scenes, pictures of them and films."""
 
 from __future__ import annotations
 
@@ -9,8 +9,9 @@ from typing import Any
 
 import tyro
 
-from spikecam_env.cli.options import Count, Seed, Size
+from spikecam_env.cli.options import Size
 from spikecam_env.errors import InputError, unknown_name
+from spikecam_env.numbers import Count, Seed
 
 SHOWN_AT = 500
 """Frame of which the sheet has pictures."""
@@ -118,7 +119,7 @@ class Scenes:
 
 
 def about(name: str) -> str:
-    """A scene's line: the first sentence of the file that it is in."""
+    """A scene's line: the first sentence of its file."""
     from scenes.catalogue import SCENES
 
     described = sys.modules[SCENES[name].__module__].__doc__ or ""

@@ -1,4 +1,4 @@
-"""What `spikecam demo` shows: a scene through environment and online denoiser, beside its clean twin and its truth."""
+"""The demonstration: a scene through environment and online denoiser, beside its clean twin and its truth."""
 
 from __future__ import annotations
 
@@ -35,12 +35,10 @@ FILM_FRAMES = 500
 TABLE_FRAMES = 250
 """Stretch that the table is of: the paper's network takes 20 times as long as `best`, so it sees no more."""
 
-Planes = NDArray[np.float32]
-
 
 @dataclass(frozen=True)
 class Streamed:
-    """One run.  noisy, clean, denoised: (T, H, W) uint8.  planes, truths: (H, W) float32, of blocks' middle frames."""
+    """One run; streams are (T, H, W)."""
 
     mode: str
     frame_rate_hz: float
@@ -48,7 +46,9 @@ class Streamed:
     clean: Spikes
     denoised: Spikes
     planes: list[Pictures]
+    """Rate planes (H, W) of the middle frames of blocks."""
     truths: list[Pictures]
+    """True light (H, W) of the same frames."""
     camera_s: float
     denoiser_s: float
     latency: int
@@ -77,9 +77,18 @@ def stream(
 ) -> Streamed:
     """Stream a scene through environment and denoiser.
 
-    scene: "disk" (at a speed of rpm, default 2000), or another name of the catalogue.
-    least: frames that are needed for what is to be shown: FILM_FRAMES or PICTURE_FRAMES.
-    Errors: InputError for fewer frames, an unknown scene, and rpm with another scene than the disk.
+    Args:
+        scene: "disk", or another name of the catalogue.
+        rpm: speed of the disk; default 2000.
+        frames: length of the stream.
+        mode: of the denoiser.
+        model: of the sensor.
+        shape: (rows, columns).
+        seed: of scene, camera unit and noise.
+        least: fewest frames that can be shown, FILM_FRAMES or PICTURE_FRAMES.
+
+    Raises:
+        InputError: fewer frames, an unknown scene, or rpm with another scene than the disk.
     """
     if frames < least:
         raise InputError(f"{frames} frames are too few to show; ask for {least} or more (1200 are a turn at 2000 rpm)")
@@ -133,7 +142,7 @@ def stream(
 def _camera(
     scene: str, rpm: float | None, shape: tuple[int, int], seed: int, **options: Any
 ) -> tuple[gymnasium.Env, dict[str, Any]]:
-    """The environment, and the options of reset with which the camera is where it belongs."""
+    """The environment, and the options of reset that put the camera before the scene."""
     if scene == "disk":
         env = gymnasium.make("spikecam_env/RotatingDisk-v0", shape=shape, rpm=2000.0 if rpm is None else rpm, **options)
         return env, {"centre": ((shape[1] - 1) / 2, (shape[0] - 1) / 2), "drift_px_s": (0.0, 0.0)}
@@ -169,16 +178,19 @@ def _panels(run: Streamed, block: int) -> list[PicturePanel]:
 
 
 def comparison(run: Streamed) -> list[dict[str, Any]]:
-    """Noisy, denoised in both modes, and clean twin, over TABLE_FRAMES from the middle of the run: mean PSNR [dB].
+    """A row a stream over TABLE_FRAMES from the middle of the run: mean PSNR [dB].
 
-    light: TFP 21 and TFP 41 pictures, and the picture of one instant (TFI; of a denoiser its rate plane), against the
-    true light.  twin: TFP pictures against the clean twin's.  A TFP picture of a fast disk is blurred by its motion,
-    41 frames are 24 pixels at the rim: the clean twin's row says how far it can come.
+    Columns `light` compare pictures with the true light: TFP 21, TFP 41, and one instant (TFI; of a denoiser its rate
+    plane).  Columns `twin` compare TFP pictures with the clean twin's.  Motion blurs a TFP picture of a fast disk, 41
+    frames are 24 pixels at the rim, so the clean twin's row is the limit of the others.
+
+    Returns:
+        Rows of noisy, denoised in both modes, and clean twin.
     """
     first = max(FIRST_SHOWN, (len(run.truths) - TABLE_FRAMES // BLOCK) // 2)
     stretch = slice(first * BLOCK, first * BLOCK + TABLE_FRAMES)
     noisy, clean = run.noisy[stretch], run.clean[stretch]
-    streams: dict[str, tuple[Spikes, Planes | None]] = {"noisy": (noisy, None)}
+    streams: dict[str, tuple[Spikes, Pictures | None]] = {"noisy": (noisy, None)}
     for mode in ("paper", "best"):
         streams[mode] = _denoised(mode, noisy)
     streams["clean twin"] = (clean, None)
@@ -200,7 +212,7 @@ def comparison(run: Streamed) -> list[dict[str, Any]]:
     return rows
 
 
-def _denoised(mode: str, spikes: Spikes) -> tuple[Spikes, Planes]:
+def _denoised(mode: str, spikes: Spikes) -> tuple[Spikes, Pictures]:
     online = OnlineDnSS.pretrained(mode, output="both")
     parts = []
     for start in tqdm(range(0, len(spikes), BLOCK), desc=f"compare ({mode})", unit="block", leave=False):

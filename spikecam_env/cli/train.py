@@ -6,9 +6,8 @@ from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-from spikecam_env.checked import checked_count, checked_number
-from spikecam_env.cli.options import Checked, Count, Positive, Seed, Workers
 from spikecam_env.errors import InputError
+from spikecam_env.numbers import Count, Positive, Range, Seed, WholeRange, Workers
 
 RECONSTRUCTORS = ("spk2img-clean", "spk2img-noisy", "ssml")
 DENOISERS = ("best", "fast", "paper")
@@ -43,11 +42,11 @@ class Train:
     """Training steps in all; the learning rate falls to zero over them."""
     minutes: Positive | None = None
     """End after this many minutes, instead of after --steps."""
-    batch: Annotated[int, Checked(checked_count, most=65_536)] | None = None
+    batch: Annotated[int, WholeRange(1, 65_536)] | None = None
     """Streams a step.  Default: 16; for reconstructors 64."""
     patch: Count = 64
     """Side of a stream's frames [pixels], a multiple of 16, at most 128."""
-    lr: Annotated[float, Checked(checked_number, least=0.0, most=1.0, above=True)] = 1e-3
+    lr: Annotated[float, Range(0.0, 1.0, above=True)] = 1e-3
     """Highest learning rate."""
     seed: Seed = 0
     """Seed of network, scenes, cameras and noise."""

@@ -8,8 +8,7 @@ from typing import Annotated
 
 import tyro
 
-from spikecam_env.checked import checked_count
-from spikecam_env.cli.options import Checked, Count, Seed
+from spikecam_env.numbers import Count, Seed, WholeRange
 
 MOST_ENVIRONMENTS = 1024
 """Number of cameras stepped together."""
@@ -27,13 +26,13 @@ class TrainAgent:
     out: Path
     """Folder of the run: agent.pt, curve.json, and last.pt to go on from."""
     obs: str = "tfp"
-    """What the agent sees: tfp, tfi, spikes, rate (denoised), dim_rate (the same, brighter), clean (no noise),
+    """Observation: tfp, tfi, spikes, rate (denoised), dim_rate (the same, brighter), clean (no noise),
     frame30 or frame1000."""
     steps: Count | None = None
     """Steps of all environments together.  Default: as many as the shipped agents had."""
     seed: Seed = 0
     """Seed of network, actions, episodes and cameras."""
-    environments: Annotated[int, Checked(checked_count, most=MOST_ENVIRONMENTS)] = 16
+    environments: Annotated[int, WholeRange(1, MOST_ENVIRONMENTS)] = 16
     """Number of cameras stepped together."""
     plain: bool = False
     """Train by PPO from rewards alone, without the auxiliary loss that asks for the target's place."""

@@ -12,9 +12,10 @@ import tyro
 
 from spikecam_env.checked import checked_memory
 from spikecam_env.cli.camera import CameraOptions
-from spikecam_env.cli.options import Count, Seed, Size
+from spikecam_env.cli.options import Size
 from spikecam_env.cli.reading import ReadingOptions
 from spikecam_env.errors import InputError, unknown_name
+from spikecam_env.numbers import Count, Seed
 
 if TYPE_CHECKING:
     from spikecam_env.cli.live.streams import Stream

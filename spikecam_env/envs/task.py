@@ -13,8 +13,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from spikecam_env.checked import as_number
-from spikecam_env.errors import InputError, shown
+from spikecam_env.checked import checked_number
 
 PROGRESS = 20.0
 """Reward for the whole way from a corner to the middle: of the order of ten, so that usual learning rates fit."""
@@ -34,11 +33,7 @@ def drawn_within(rng: np.random.Generator, most: float) -> tuple[float, float]:
 
 def checked_limit(name: str, value: float | None, default: float) -> float:
     """The most that something is [pixels, pixels/s], or the default for None; raises InputError below 0."""
-    if value is None:
-        return default
-    if not 0 <= as_number(value) < np.inf:
-        raise InputError(f"{name} is {shown(value)}; it must be 0 or more, and finite")
-    return float(value)
+    return default if value is None else checked_number(value, name, 0.0)
 
 
 def polar(distance: float, direction: float) -> tuple[float, float]:

@@ -49,6 +49,7 @@ from spikecam_env.gap.verdict.bounds import bounds as upper_bounds
 from spikecam_env.gap.verdict.comparison import Comparison, aligned_mean
 from spikecam_env.gap.verdict.moving import moves, static_note
 from spikecam_env.gap.verdict.verdict import conclude, with_given_parameters, with_stand_ins
+from spikecam_env.numbers import Range
 from spikecam_env.sensor import SensorModel
 from spikecam_env.sensor.own_effects import files_of
 
@@ -101,8 +102,7 @@ def diagnose(
         >>> diagnosis.sentence
         'No gap: these recordings and the model scsim agree to within the noise.'
     """
-    if not effort > 0:
-        raise InputError(f"effort {effort:g}: it must be above 0")
+    Range(0, above=True, infinite=True).check(effort, "effort")
     settings = checked_settings(settings)
     stages = Stages(progress)
     measured = campaign if isinstance(campaign, Campaign) else read_campaign(campaign)

@@ -16,8 +16,8 @@ from typing import Any
 
 import numpy as np
 
-from spikecam_env.checked import as_number
 from spikecam_env.errors import InputError, shown, unknown_name
+from spikecam_env.numbers import Range
 
 
 def parameter(
@@ -83,15 +83,13 @@ def _checked(value: Any, field: dataclasses.Field[Any], place: str) -> bool | in
         return str(value)
     if isinstance(field.default, bool):
         if not isinstance(value, (bool, np.bool_)):
-            raise InputError(f"{place} = {shown(value)} must be true or false")
+            raise InputError(f"{place} = {shown(value)}; it must be true or false")
         return bool(value)
-    low, high = field.metadata["bounds"]
-    largest = field.metadata["largest"]
-    number = as_number(value)
-    if not low <= number <= high or (largest is not None and largest < number < math.inf):
-        raise InputError(f"{place} = {shown(value)} is outside {range_text(field)} {field.metadata['unit']}".rstrip())
+    (low, high), largest = field.metadata["bounds"], field.metadata["largest"]
+    most = high if largest is None else largest
+    number = Range(low, most, field.metadata["unit"], infinite=high == math.inf).check(value, place)
     if isinstance(field.default, int):
         if not number.is_integer():
-            raise InputError(f"{place} = {shown(value)} must be a whole number")
+            raise InputError(f"{place} = {shown(value)}; it must be a whole number")
         return int(number)
     return number + 0.0  # of -0.0 too: 0.0

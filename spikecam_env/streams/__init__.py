@@ -1,8 +1,8 @@
 """Spike streams: packing, files, intervals (ISI) and pictures (TFP, TFI)."""
 
+from spikecam_env.streams.array_files import save_npz
 from spikecam_env.streams.hdf5 import SpikeWriter, read_truth
 from spikecam_env.streams.isi import isi_plane, isi_planes
-from spikecam_env.streams.npz import save_npz
 from spikecam_env.streams.packing import pack_frames, unpack_frames
 from spikecam_env.streams.pictures import middleTFI, middleTFP, tfp_film
 from spikecam_env.streams.recording import Recording, read_recording

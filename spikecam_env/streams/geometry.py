@@ -1,4 +1,4 @@
-"""Whether a headerless file was read with the right geometry: what its spikes say.
+"""Whether a headerless file was read with the right geometry, by its spikes.
 
 A pixel of a spike camera integrates light, so its spikes are regular: one that fires less than every second frame
 hardly ever fires in two frames running, and one that fires more often hardly ever misses two.  Call the rarer of spike
@@ -6,7 +6,7 @@ and gap an event, b in {0, 1}.
 
 1. Coincidence.  In blocks of BLOCK frames, over the pixels with n events in a block,
 
-       c = events in frames t and t + 1 / (sum of n (n - 1) / BLOCK, what chance gives)
+       c = events in frames t and t + 1 / (sum of n (n - 1) / BLOCK, as by chance)
 
    read right: 0.00;  frames of another length, so other pixels: 1.
 
@@ -24,7 +24,7 @@ and gap an event, b in {0, 1}.
    between pixels 15 apart than between those that seem neighbours.
 
 Each speaks only where there is enough to see: a dark recording, two frames or a picture without structure say nothing.
-`python -m pytest -s tests/streams/test_geometry.py` prints what they are on recordings read right and wrong.
+`python -m pytest -s tests/streams/test_geometry.py` prints these figures of recordings read right and wrong.
 """
 
 from __future__ import annotations
@@ -34,9 +34,9 @@ from dataclasses import dataclass
 
 import numpy as np
 import scipy
-from numpy.typing import NDArray
 
 from spikecam_env.streams.packing import BitOrder, packed_bytes
+from spikecam_env.types import Floats, Spikes
 
 KNOWN_SHAPES = (
     (250, 400),
@@ -88,10 +88,11 @@ STRETCH = 3.0
 
 @dataclass(frozen=True)
 class Doubt:
-    """What is wrong with a reading.  sizes: (rows, columns) that would be right, as far as can be said."""
+    """A fault of a reading."""
 
     text: str
     sizes: tuple[tuple[int, int], ...] = ()
+    """(rows, columns) that would be right, as far as they are known."""
 
     def __str__(self) -> str:
         if not self.sizes:
@@ -99,8 +100,8 @@ class Doubt:
         return f"{self.text}; looks right: {', '.join(f'height={h}, width={w}' for h, w in self.sizes)}"
 
 
-def geometry_doubt(packed: NDArray[np.uint8], shape: tuple[int, int], bit_order: BitOrder = "little") -> Doubt | None:
-    """Why frames (T, ceil(H W / 8)) of a file should not be of this shape and bit order; None where nothing says so."""
+def geometry_doubt(packed: Spikes, shape: tuple[int, int], bit_order: BitOrder = "little") -> Doubt | None:
+    """The doubt that frames (T, ceil(H W / 8)) of a file are of this shape and bit order; None where there is none."""
     if len(packed) < 2:
         return None
     one = _byte_of_a_pixel(packed, shape)
@@ -127,7 +128,7 @@ def geometry_doubt(packed: NDArray[np.uint8], shape: tuple[int, int], bit_order:
     return None
 
 
-def looks_right(packed: NDArray[np.uint8], bit_order: BitOrder = "little") -> bool:
+def looks_right(packed: Spikes, bit_order: BitOrder = "little") -> bool:
     """Whether frames (T, bytes) of a file have the length that they should: their spikes say so, beyond chance."""
     lag = 8 * packed.shape[1]
     bits = np.unpackbits(packed[: max(2, MOST_BITS // lag)].ravel(), bitorder=bit_order)
@@ -136,12 +137,14 @@ def looks_right(packed: NDArray[np.uint8], bit_order: BitOrder = "little") -> bo
 
 @dataclass(frozen=True)
 class Coincidences:
-    """chance: coincidences in successive frames that chance would give.  c: (LAGS,) seen by chance's, 1 .. LAGS frames
-    apart.  by_part: the same two, of successive frames, for each stretch of the frame that has enough of them."""
+    """How often events of a pixel coincide, beside chance."""
 
     chance: float
-    c: NDArray[np.float64]
+    """Coincidences in successive frames that chance would give."""
+    c: Floats
+    """(LAGS,) coincidences over those of chance, 1 .. LAGS frames apart."""
     by_part: tuple[tuple[float, float], ...] = ()
+    """The same two, of successive frames, for each stretch of the frame that has enough of them."""
 
     @property
     def next_frame(self) -> float:
@@ -157,8 +160,8 @@ class Coincidences:
         return all(abs(math.log(max(c, 1e-9))) < math.log(LIKE_CHANCE) + 3 / math.sqrt(n) for n, c in found)
 
 
-def coincidences(bits: NDArray[np.uint8], lag: int) -> Coincidences:
-    """c of the module's rule 1, of frames of `lag` bits, one after the other in `bits`; 0 where nothing is known."""
+def coincidences(bits: Spikes, lag: int) -> Coincidences:
+    """The module's rule 1, for frames of `lag` bits, one after the other in `bits`; 0 where nothing is known."""
     frames = bits[: len(bits) // lag * lag].reshape(-1, lag)[:256]
     block = min(BLOCK, len(frames))
     if block < 4:
@@ -179,10 +182,13 @@ def coincidences(bits: NDArray[np.uint8], lag: int) -> Coincidences:
     return Coincidences(chance * (block - 1), seen / chance if chance else np.zeros(LAGS), tuple(by_part))
 
 
-def repels(bits: NDArray[np.uint8], lag: int, least: float = DEEP) -> bool:
+def repels(bits: Spikes, lag: int, least: float = DEEP) -> bool:
     """Whether bits this far apart repel as a pixel and itself a frame later do.
 
-    least: the share of the chance coincidences, rate^2, that has to be missing.
+    Args:
+        bits: (n,) of the file.
+        lag: distance [bits].
+        least: share of the chance coincidences, rate^2, that has to be missing.
     """
     rate = float(bits.mean())
     rarer, rate = (bits, rate) if rate <= 0.5 else (1 - bits, 1 - rate)
@@ -203,7 +209,7 @@ def repels(bits: NDArray[np.uint8], lag: int, least: float = DEEP) -> bool:
     return lowest > 0.5 * float(np.mean(depths))
 
 
-def frame_length(bits: NDArray[np.uint8]) -> int | None:
+def frame_length(bits: Spikes) -> int | None:
     """The shortest distance [bits], a whole number of bytes, at which bits repel; None where there is none."""
     flow = bits[:SEARCHED]
     rate = float(flow.mean())
@@ -227,7 +233,7 @@ def frame_length(bits: NDArray[np.uint8]) -> int | None:
     return None
 
 
-def row_length(picture: NDArray[np.float64], shape: tuple[int, int]) -> int:
+def row_length(picture: Floats, shape: tuple[int, int]) -> int:
     """Pixels in a row: the width of `shape`, unless the rows of another size of as many pixels agree much better."""
     pixels, width = picture.size, shape[1]
     others = {*_sides(pixels), *(w for h, w in KNOWN_SHAPES if h * w == pixels)}
@@ -238,7 +244,7 @@ def row_length(picture: NDArray[np.float64], shape: tuple[int, int]) -> int:
     return best if found.get(best, 0.0) > found.get(width, 0.0) + margin else width
 
 
-def bits_turned(picture: NDArray[np.float64]) -> bool:
+def bits_turned(picture: Floats) -> bool:
     """Whether the pixels of every byte stand in the other order."""
     parts = 32
     each = (len(picture) // 8 - 1) // parts
@@ -252,7 +258,7 @@ def bits_turned(picture: NDArray[np.float64]) -> bool:
     return bool(sure and max(inside, float(far.mean())) < TURNED * float(across.mean()))
 
 
-def _byte_of_a_pixel(packed: NDArray[np.uint8], shape: tuple[int, int]) -> int:
+def _byte_of_a_pixel(packed: Spikes, shape: tuple[int, int]) -> int:
     """1 or 255 where bytes are that or 0, and change from frame to frame; else 0."""
     some = packed[: max(2, MOST_BITS // (8 * packed.shape[1]))]
     if shape[0] * shape[1] < 16 or np.array_equal(some[0], some[-1]):
@@ -261,8 +267,8 @@ def _byte_of_a_pixel(packed: NDArray[np.uint8], shape: tuple[int, int]) -> int:
     return next((one for one in (1, 255) if values[one] > 100 and values[0] + values[one] == some.size), 0)
 
 
-def _other_length(bits: NDArray[np.uint8], lag: int, by_lag: Coincidences) -> Doubt | None:
-    """What to say where spikes coincide: the length of a frame if it is found, nothing where the light may do it."""
+def _other_length(bits: Spikes, lag: int, by_lag: Coincidences) -> Doubt | None:
+    """The doubt where spikes coincide: another length of a frame, or none; no doubt where the light may do it."""
     length = frame_length(bits)
     seen = (
         f"spikes of a pixel in successive frames coincide {by_lag.next_frame:.2f} times as often as by chance "
@@ -276,7 +282,7 @@ def _other_length(bits: NDArray[np.uint8], lag: int, by_lag: Coincidences) -> Do
     return None
 
 
-def _shorter_frame(bits: NDArray[np.uint8], lag: int) -> int | None:
+def _shorter_frame(bits: Spikes, lag: int) -> int | None:
     """A whole part of a frame after which bits repel already; None where there is none."""
     for parts in range(16, 1, -1):
         if lag % (8 * parts) == 0 and repels(bits, lag // parts) and _regular(bits, lag // parts):
@@ -284,13 +290,13 @@ def _shorter_frame(bits: NDArray[np.uint8], lag: int) -> int | None:
     return None
 
 
-def _regular(bits: NDArray[np.uint8], lag: int) -> bool:
+def _regular(bits: Spikes, lag: int) -> bool:
     """Whether frames of `lag` bits do not coincide, as far as can be said."""
     found = coincidences(bits, lag)
     return found.chance < FEWEST_CHANCES or found.next_frame < COINCIDES
 
 
-def _sizes(bits: NDArray[np.uint8], lag: int) -> tuple[tuple[int, int], ...]:
+def _sizes(bits: Spikes, lag: int) -> tuple[tuple[int, int], ...]:
     """Sizes whose frames take so many bits: known ones, else the one whose rows agree best."""
     known = tuple(size for size in KNOWN_SHAPES if 8 * packed_bytes(size) == lag)
     if known:
@@ -318,14 +324,14 @@ def _parts(lag: int) -> list[tuple[int, int]]:
     return [(start, start + size) for start in range(0, lag - size + 1, max(1, (lag - size) // 7 or lag))][:8]
 
 
-def _correlation(picture: NDArray[np.float64], distance: int) -> float:
+def _correlation(picture: Floats, distance: int) -> float:
     centred = _clipped(picture)
     centred = centred - centred.mean()
     power = float((centred * centred).mean())
     return float((centred[:-distance] * centred[distance:]).mean()) / power if power else 0.0
 
 
-def _clipped(picture: NDArray[np.float64]) -> NDArray[np.float64]:
+def _clipped(picture: Floats) -> Floats:
     """Without the tails that hot and dead pixels make."""
     low, high = np.percentile(picture, (1, 99))
     return np.clip(picture, low, high)

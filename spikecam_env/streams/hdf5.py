@@ -4,7 +4,7 @@
 /clean            the same of the noise-free twin on the same initial phase; optional
 /truth/<name>     (N, ...) ground truth, /truth/frame (N,) float64 the frames it belongs to; optional
 attributes        format = "spikecam-recording/1", height, width, package_version,
-                  frame_rate_hz (absent where unknown), and what the writer added: model, seed, scene, ...
+                  frame_rate_hz (absent where unknown), and the writer's own: model, seed, scene, ...
 
 Spikes are stored in chunks of CHUNK_FRAMES frames x CHUNK_ROWS rows, so that a window of a crop is read without the
 rest.  The same calls write the same bytes: the file holds no time of its making.
@@ -23,7 +23,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from types import TracebackType
-from typing import Any, Literal
+from typing import Any, Literal, TypeGuard
 
 import h5py
 import numpy as np
@@ -32,9 +32,9 @@ from pydantic import ConfigDict
 
 from spikecam_env.checked import checked_number, checked_shape
 from spikecam_env.errors import InputError, NotReadyError, shown, unknown_name
-from spikecam_env.streams.files import check_range
-from spikecam_env.streams.packing import as_spikes, pack_checked, packed_bytes, unpack_frames
+from spikecam_env.streams.packing import as_spikes, check_range, pack_checked, packed_bytes, unpack_frames
 from spikecam_env.streams.whole_hdf5 import WholeHDF5
+from spikecam_env.types import Spikes
 from spikecam_env.untrusted import (
     Count,
     Declared,
@@ -49,6 +49,8 @@ from spikecam_env.version import __version__
 from spikecam_env.whole import check_file
 
 FORMAT = "spikecam-recording/1"
+HDF5 = (".h5", ".hdf5")
+"""Endings of the names of HDF5 files."""
 CHUNK_FRAMES = 32
 CHUNK_ROWS = 16
 CACHE_BYTES = 1 << 24
@@ -63,19 +65,23 @@ RESERVED = ("format", "height", "width", "frame_rate_hz", "package_version")
 class SpikeWriter:
     """Writes a recording piece by piece; the file appears whole when the `with` block ends without an exception.
 
-        with SpikeWriter("disk.h5", (250, 400), 40_000.0, model="scsim", seed=0, scene="disk") as writer:
-            writer.append(spikes)
+    Args:
+        path: .h5 file.
+        shape: (rows, columns).
+        frame_rate_hz: of the camera; None where unknown.
+        attributes: text, numbers or bools.
 
-    shape: (rows, columns).  frame_rate_hz: None where unknown.  attributes: text, numbers or bools.
-    Errors: InputError for an attribute of another type or a reserved name, spikes of another shape, or a place that
-    cannot be written to, e.g. because the disk is full.
+    Raises:
+        InputError: an attribute of another type or a reserved name, spikes of another shape, or a place that cannot be
+            written to, e.g. because the disk is full.
 
-    >>> with SpikeWriter("flat.h5", (2, 3), 40_000.0, scene="flat") as writer:
-    ...     writer.append(np.zeros((8, 2, 3), np.uint8))
-    ...     writer.append(np.ones((4, 2, 3), np.uint8))
-    >>> recording = read_recording("flat.h5")
-    >>> recording.spikes.shape, recording.attributes["scene"]
-    ((12, 2, 3), 'flat')
+    Example:
+        >>> with SpikeWriter("flat.h5", (2, 3), 40_000.0, scene="flat") as writer:
+        ...     writer.append(np.zeros((8, 2, 3), np.uint8))
+        ...     writer.append(np.ones((4, 2, 3), np.uint8))
+        >>> recording = read_recording("flat.h5")
+        >>> recording.spikes.shape, recording.attributes["scene"]
+        ((12, 2, 3), 'flat')
     """
 
     def __init__(
@@ -160,7 +166,7 @@ class SpikeWriter:
             name, (0, size), np.uint8, maxshape=(None, size), chunks=chunk, fletcher32=True
         )
 
-    def _checked(self, spikes: ArrayLike) -> NDArray[np.uint8]:
+    def _checked(self, spikes: ArrayLike) -> Spikes:
         frames = as_spikes(spikes)
         if frames.shape[1:] != self.shape:
             raise InputError(
@@ -176,12 +182,21 @@ class SpikeWriter:
 
 def read_hdf5(
     path: str | Path, *, first: int = 0, count: int | None = None, stream: str = "spikes"
-) -> tuple[NDArray[np.uint8], dict[str, Any]]:
-    """A recording -> (T, H, W) uint8 spikes and its attributes; only the frames asked are read.
+) -> tuple[Spikes, dict[str, Any]]:
+    """Read frames of a recording.
 
-    stream: "spikes", or "clean" for the noise-free twin's.
-    Raises InputError if the file is absent, truncated, damaged, not HDF5, of another format, declares more than it
-    stores, or has no such stream.
+    Args:
+        path: .h5 file of this package.
+        first: first frame to read.
+        count: frames to read; default all.
+        stream: "spikes", or "clean" for the noise-free twin's.
+
+    Returns:
+        (T, H, W) spikes, and attributes of the file.
+
+    Raises:
+        InputError: the file is absent, damaged, of another format, or declares more than it stores; or has no such
+            stream.
     """
     with open_recording(path) as recording:
         if stream not in recording.streams:
@@ -226,30 +241,26 @@ def read_truth(
 
 @dataclass(frozen=True)
 class OpenRecording:
-    """An HDF5 recording, open for reading.
-
-    shape: (rows, columns).  streams: names of the packed streams in it, "spikes" and perhaps "clean".
-    """
+    """An HDF5 recording, open for reading."""
 
     file: h5py.File
     path: Path
     shape: tuple[int, int]
+    """(rows, columns)."""
     attributes: dict[str, Any]
     streams: dict[str, h5py.Dataset]
+    """Packed streams by name, "spikes" and perhaps "clean"."""
 
     def frames(self, stream: str) -> int:
         """Length of a stream [frames]."""
         return len(self.streams[stream])
 
-    def read(self, stream: str, frames: slice, columns: slice = slice(None)) -> NDArray[np.uint8]:
+    def read(self, stream: str, frames: slice, columns: slice = slice(None)) -> Spikes:
         """Packed frames, or their part from byte to byte; raises InputError where they are damaged."""
         return hdf5_values(self.file, stream, str(self.path), (frames, columns))
 
-    def read_crop(self, stream: str, frames: slice, rows: slice, columns: slice) -> NDArray[np.uint8]:
-        """(frames, rows, columns) uint8 of 0 and 1.
-
-        The slices have start and stop, within the stream.  Read are the chunks that hold these frames and rows.
-        """
+    def read_crop(self, stream: str, frames: slice, rows: slice, columns: slice) -> Spikes:
+        """(frames, rows, columns) spikes, for slices with start and stop; only chunks that hold them are read."""
         width = self.shape[1]
         first_byte, skipped = divmod(rows.start * width, 8)
         bits = (rows.stop - rows.start) * width
@@ -302,17 +313,19 @@ def _damage_named(path: str | Path) -> Iterator[None]:
 
 
 def is_recording(path: str | Path) -> bool:
-    """Whether an HDF5 file says that this package wrote it, if not in words that it would use.
-
-    Raises InputError where it is no HDF5 file.
-    """
+    """Whether an HDF5 file has a format of this package, if perhaps a wrong one."""
     with open_hdf5(path) as file:
         found = hdf5_attributes(file, str(path)).get("format", "")
     return not isinstance(found, str) or found.startswith("spikecam")
 
 
+def is_array(item: Any) -> TypeGuard[h5py.Dataset]:
+    """Whether something in a file is an array that has values."""
+    return isinstance(item, h5py.Dataset) and item.shape is not None
+
+
 def check_stored(dataset: h5py.Dataset, where: str) -> None:
-    """Raises InputError where an array declares more than is stored: what lacks would be read as zeros."""
+    """Raises InputError where an array declares more than is stored: the rest would be read as zeros."""
     declared_bytes = math.prod(dataset.shape) * dataset.dtype.itemsize
     most = 1 if dataset.compression is None else MOST_COMPRESSED
     if declared_bytes > most * dataset.id.get_storage_size():
@@ -324,7 +337,7 @@ def check_stored(dataset: h5py.Dataset, where: str) -> None:
 
 def _stream(file: h5py.File, name: str, shape: tuple[int, int], where: str) -> h5py.Dataset:
     found = hdf5_item(file, name, where)
-    if not isinstance(found, h5py.Dataset) or found.shape is None:
+    if not is_array(found):
         raise InputError(f"{where}: {name} is no array")
     if found.dtype != np.uint8 or found.ndim != 2 or found.shape[1] != packed_bytes(shape):
         raise InputError(
@@ -358,7 +371,7 @@ def _grow(dataset: h5py.Dataset, rows: NDArray[Any]) -> None:
 
 
 def _storable(value: object, name: str) -> object:
-    """A value as h5py takes it: text as bytes, which lie in place; raises InputError for what HDF5 cannot hold."""
+    """A value as h5py takes it: text as bytes, which lie in place; raises InputError where HDF5 has no such value."""
     if isinstance(value, str):
         if "\0" in value:
             raise InputError(f"attribute {name} has a zero character; give other text")

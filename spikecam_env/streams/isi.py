@@ -7,13 +7,13 @@ For a stream of T frames and a pixel with spikes at frames s (0 <= s < T):
     ISI(t)  = min(next(t), t + future + 1) - last(t)          [frames], an integer >= 1
 
 The interval at t is the one that runs at the end of frame t: a spike in frame t opens a new interval.
-Where a bounding spike is missing the interval counts to the edge of what was seen (one frame before the
-data, one frame after them, or one frame after the look-ahead): a lower bound on the true interval.
+Where a bounding spike is missing the interval counts to the edge of the frames seen, a lower bound on the true
+interval.  The edge is one frame before the data, one after them, or one after the look-ahead.
 
 `future` is the look-ahead in frames.  Plane t depends on frames 0 .. t + future only, so a causal
 filter that lags by `future` frames computes the same plane.  None looks to the end of the data.
 Intervals are exact to 2^24 frames (7 minutes at 40 kHz); a longer one is the nearest float32.
-Normalised plane: 1 / ISI, in (0, 1], an estimate of the rate [spikes/frame].  Source: DESIGN section 5.
+Normalised plane: 1 / ISI, in (0, 1], an estimate of the rate [spikes/frame].
 """
 
 from __future__ import annotations
@@ -30,12 +30,20 @@ MOST_FRAMES = 2**31 - 1
 
 
 def isi_plane(spikes: ArrayLike, t: int, *, future: int | None = None, normalised: bool = False) -> NDArray[np.float32]:
-    """(T, H, W) spikes -> (H, W) float32, the interval at frame t [frames], or its inverse if `normalised`.
+    """The plane at a frame.
 
-    Errors: InputError if t is outside the stream or `future` is negative.
+    Args:
+        spikes: (T, H, W).
+        t: frame.
+        future: look-ahead [frames]; None for the end of the data.
+        normalised: return 1 / ISI [spikes/frame] instead of ISI [frames].
 
-    >>> isi_plane(np.uint8([1, 0, 0, 1, 0, 1]).reshape(6, 1, 1), t=2).tolist()
-    [[3.0]]
+    Returns:
+        (H, W).
+
+    Example:
+        >>> isi_plane(np.uint8([1, 0, 0, 1, 0, 1]).reshape(6, 1, 1), t=2).tolist()
+        [[3.0]]
     """
     return np.asarray(isi_planes(spikes, start=t, stop=t + 1, future=future, normalised=normalised)[0])
 
@@ -48,13 +56,21 @@ def isi_planes(
     future: int | None = None,
     normalised: bool = False,
 ) -> NDArray[np.float32]:
-    """(T, H, W) spikes -> (stop - start, H, W) float32: plane i is `isi_plane(spikes, start + i)`.
+    """Planes of frames `start` to `stop`, of which each sees the whole stream; time is O(T) a pixel.
 
-    The whole stream is seen whatever `start` and `stop` are; time is O(T) a pixel.
-    Errors: InputError unless 0 <= start < stop <= T and future >= 0.
+    Args:
+        spikes: (T, H, W).
+        start: first frame.
+        stop: frame after the last; default T.
+        future: look-ahead [frames]; None for the end of the data.
+        normalised: return 1 / ISI [spikes/frame] instead of ISI [frames].
 
-    >>> isi_planes(np.uint8([1, 0, 0, 1, 0, 1]).reshape(6, 1, 1), start=2, stop=5).ravel().tolist()
-    [3.0, 2.0, 2.0]
+    Returns:
+        (stop - start, H, W): plane i is `isi_plane(spikes, start + i)`.
+
+    Example:
+        >>> isi_planes(np.uint8([1, 0, 0, 1, 0, 1]).reshape(6, 1, 1), start=2, stop=5).ravel().tolist()
+        [3.0, 2.0, 2.0]
     """
     frames = as_spikes(spikes)
     count = len(frames)
@@ -83,8 +99,10 @@ def _isi(
     planes: NDArray[np.float32],
     last_of: NDArray[np.int32],
 ) -> None:
-    """Fill `planes`.  last_of: the same memory as int32, which holds last(t) until the interval is known: float32 would
-    round frames beyond 2^24."""
+    """Fill `planes`; `last_of` is the same memory as int32, which holds last(t) until the interval is known.
+
+    In float32 frames beyond 2^24 would be rounded.
+    """
     count, pixels = spikes.shape
     strip = 2048
     for s in range((pixels + strip - 1) // strip):

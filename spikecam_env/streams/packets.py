@@ -7,8 +7,8 @@
 A frame is 2000 packets and begins with that of line 500, channel 0, and ends with that of line 500, channel 3; a dump
 may begin in the middle of one.  Rows are taken in the order of the file.
 
-This is what the public parser says (SpikeCV, `sps_parser.py` and `load_dat.py`); no dump was at hand to try.  So the
-reader checks what the description allows to be checked, and refuses a file that is out of step.
+The layout is that of the public parser (SpikeCV, `sps_parser.py` and `load_dat.py`); no dump was at hand to try.  So
+the reader checks lines and channels, and refuses a file that is out of step.
 """
 
 from __future__ import annotations
@@ -19,6 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from spikecam_env.errors import InputError
+from spikecam_env.types import Spikes
 
 SHAPE = (1000, 1000)
 PACKET = 64
@@ -48,7 +49,7 @@ def find_frames(source: Path) -> tuple[int, int]:
     )
 
 
-def looks_like_packets(head: NDArray[np.uint8]) -> bool:
+def looks_like_packets(head: Spikes) -> bool:
     """Whether bytes have the tags of packets: lines of 1 to 500 throughout, and channels in pairs."""
     for begin in range(0, PACKET, STEP):
         line, channel = _tags(head[: 400 * PACKET], begin)
@@ -58,7 +59,7 @@ def looks_like_packets(head: NDArray[np.uint8]) -> bool:
     return False
 
 
-def read_frames(source: Path, offset: int, first: int, count: int) -> NDArray[np.uint8]:
+def read_frames(source: Path, offset: int, first: int, count: int) -> Spikes:
     """(count, 1000, 1000) uint8 of 0 and 1; raises InputError where a frame does not begin and end with its tags."""
     size = PER_FRAME * PACKET
     flow = np.fromfile(source, np.uint8, count=count * size, offset=offset + first * size)
@@ -75,7 +76,7 @@ def read_frames(source: Path, offset: int, first: int, count: int) -> NDArray[np
     return np.unpackbits(packets, axis=1, count=PIXELS, bitorder="little").reshape(count, *SHAPE)
 
 
-def _tags(flow: NDArray[np.uint8], begin: int) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+def _tags(flow: Spikes, begin: int) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
     """Lines and channels of the packets from byte `begin` on."""
     packets = flow[begin : begin + (len(flow) - begin) // PACKET * PACKET].reshape(-1, PACKET)
     word = packets[:, -2].astype(np.int64) | packets[:, -1].astype(np.int64) << 8

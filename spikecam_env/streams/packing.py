@@ -12,7 +12,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from spikecam_env.checked import checked_shape as check_shape
+from spikecam_env.checked import checked_count, checked_shape, checked_whole
 from spikecam_env.errors import InputError, unknown_name
 
 BitOrder = Literal["little", "big"]
@@ -21,8 +21,9 @@ BitOrder = Literal["little", "big"]
 def pack_frames(spikes: ArrayLike, *, bit_order: BitOrder = "little") -> NDArray[np.uint8]:
     """(T, H, W) spikes -> (T, ceil(H W / 8)) uint8; raises InputError as `as_spikes` does.
 
-    >>> pack_frames(np.uint8([[[1, 0, 0, 1]]])).tolist()
-    [[9]]
+    Example:
+        >>> pack_frames(np.uint8([[[1, 0, 0, 1]]])).tolist()
+        [[9]]
     """
     return pack_checked(as_spikes(spikes), bit_order)
 
@@ -36,14 +37,13 @@ def pack_checked(frames: NDArray[np.uint8], bit_order: BitOrder = "little") -> N
 def unpack_frames(
     packed: NDArray[np.uint8], shape: tuple[int, int], *, bit_order: BitOrder = "little"
 ) -> NDArray[np.uint8]:
-    """(T, ceil(H W / 8)) uint8 -> (T, H, W) uint8 of 0 and 1.
+    """(T, ceil(H W / 8)) uint8 -> (T, H, W) uint8 of 0 and 1; raises InputError for another width.
 
-    Errors: InputError if the width is not that of `shape`.
-
-    >>> unpack_frames(np.uint8([[9]]), (1, 4)).tolist()
-    [[[1, 0, 0, 1]]]
+    Example:
+        >>> unpack_frames(np.uint8([[9]]), (1, 4)).tolist()
+        [[[1, 0, 0, 1]]]
     """
-    height, width = check_shape(shape)
+    height, width = checked_shape(shape)
     expected = packed_bytes((height, width))
     if packed.ndim != 2 or packed.dtype != np.uint8 or packed.shape[1] != expected:
         raise InputError(
@@ -62,13 +62,14 @@ def packed_bytes(shape: tuple[int, int]) -> int:
 def as_spikes(spikes: ArrayLike) -> NDArray[np.uint8]:
     """The stream as (T, H, W) uint8 of 0 and 1, without a copy where it is uint8, int8 or bool already.
 
-    Raises InputError for another dtype or number of axes, a masked array, and values other than 0 and 1.
+    Raises:
+        InputError: another dtype or number of axes, a masked array, or values other than 0 and 1.
     """
     return check_values(as_stream(spikes), spikes)
 
 
 def as_stream(spikes: ArrayLike) -> NDArray[np.uint8]:
-    """What `as_spikes` gives, its values unseen: for a part of a long stream, whose values `check_values` then sees."""
+    """As `as_spikes`, without a look at the values: of a long stream `check_values` checks a part."""
     if isinstance(spikes, np.ma.MaskedArray):
         raise InputError("spikes are a masked array, whose masked pixels have no value; give spikes.filled(0)")
     array = np.asarray(spikes)
@@ -83,7 +84,9 @@ def as_stream(spikes: ArrayLike) -> NDArray[np.uint8]:
 def check_values(frames: NDArray[np.uint8], given: ArrayLike = ()) -> NDArray[np.uint8]:
     """The frames; raises InputError where a value is neither 0 nor 1.  A pass over them, at some 10 GB a second.
 
-    given: the array as the caller has it, whose values the error names.
+    Args:
+        frames: uint8.
+        given: the array as the caller has it, whose values the error names.
     """
     if frames.max(initial=0) > 1:
         signed = np.asarray(given)
@@ -100,3 +103,14 @@ def check_bit_order(bit_order: str) -> BitOrder:
     if bit_order not in ("little", "big"):
         raise unknown_name("bit_order", bit_order, ("little", "big"))
     return "little" if bit_order == "little" else "big"
+
+
+def check_range(first: int, count: int | None, frames: int, name: str) -> tuple[int, int]:
+    """(first, stop) of the frames to read; raises InputError, with the length of `name`, where they are not in it."""
+    first = checked_whole(first, "first", 0)
+    stop = frames if count is None else first + checked_count(count, "count")
+    if not first < stop <= frames:
+        raise InputError(
+            f"frames {first} to {stop} asked of {name}, which holds {frames}; need 0 <= first < stop <= {frames}"
+        )
+    return first, stop

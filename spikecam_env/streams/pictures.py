@@ -19,13 +19,16 @@ from spikecam_env.streams.packing import as_spikes, as_stream, check_values
 
 
 def middleTFP(spikes: ArrayLike, t: int | None = None, window: int = 41) -> NDArray[np.float32]:
-    """(T, H, W) spikes -> (H, W) float32 rate [spikes/frame] in the window about frame t.
+    """Texture from playback: (H, W) rate [spikes/frame] in a window about a frame.
 
-    t defaults to the middle.  The window holds `window` frames from t - window // 2, cut to the stream.
-    Errors: InputError if t is outside the stream or window < 1.
+    Args:
+        spikes: (T, H, W).
+        t: frame; default the middle one.
+        window: frames of the window, from t - window // 2 on; it is cut to the stream.
 
-    >>> middleTFP(np.tile(np.uint8([1, 0, 0, 0]), 10).reshape(40, 1, 1), window=20).tolist()
-    [[0.25]]
+    Example:
+        >>> middleTFP(np.tile(np.uint8([1, 0, 0, 0]), 10).reshape(40, 1, 1), window=20).tolist()
+        [[0.25]]
     """
     frames = as_stream(spikes)
     t = _middle(frames, t)
@@ -34,23 +37,21 @@ def middleTFP(spikes: ArrayLike, t: int | None = None, window: int = 41) -> NDAr
 
 
 def middleTFI(spikes: ArrayLike, t: int | None = None) -> NDArray[np.float32]:
-    """(T, H, W) spikes -> (H, W) float32 rate 1 / ISI [spikes/frame] at frame t (default: the middle).
+    """Texture from interval: (H, W) rate 1 / ISI [spikes/frame] at frame t, by default the middle one.
 
-    Errors: InputError if t is outside the stream.
-
-    >>> middleTFI(np.uint8([1, 0, 0, 0, 1, 0]).reshape(6, 1, 1), t=2).tolist()
-    [[0.25]]
+    Example:
+        >>> middleTFI(np.uint8([1, 0, 0, 0, 1, 0]).reshape(6, 1, 1), t=2).tolist()
+        [[0.25]]
     """
     return isi_plane(spikes, _middle(as_stream(spikes), t), normalised=True)
 
 
 def tfp_film(spikes: ArrayLike, window: int = 41, *, every: int = 1) -> NDArray[np.float32]:
-    """(T, H, W) spikes -> (ceil(T / every), H, W) float32: `middleTFP` at frames 0, every, 2 every, ...
+    """(T, H, W) spikes -> (ceil(T / every), H, W): `middleTFP` at frames 0, every, 2 every, ...
 
-    Errors: InputError for an empty stream, window < 1 or every < 1.
-
-    >>> tfp_film(np.tile(np.uint8([1, 0, 0, 0]), 10).reshape(40, 1, 1), window=8, every=20).ravel().tolist()
-    [0.25, 0.25]
+    Example:
+        >>> tfp_film(np.tile(np.uint8([1, 0, 0, 0]), 10).reshape(40, 1, 1), window=8, every=20).ravel().tolist()
+        [0.25, 0.25]
     """
     frames = as_spikes(spikes)
     if every < 1:

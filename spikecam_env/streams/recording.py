@@ -2,34 +2,33 @@
 
 from __future__ import annotations
 
-import inspect
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-from numpy.typing import NDArray
-
 from spikecam_env.errors import InputError
-from spikecam_env.streams.foreign_hdf5 import read_foreign_hdf5
-from spikecam_env.streams.hdf5 import is_recording, read_hdf5
-from spikecam_env.streams.mat import read_mat
-from spikecam_env.streams.npz import load_npz, read_npy
+from spikecam_env.streams.array_files import read_array_file
+from spikecam_env.streams.hdf5 import HDF5, is_recording, read_hdf5
 from spikecam_env.streams.vidar import read_dat, read_raw
+from spikecam_env.types import Spikes
 
 
 @dataclass(frozen=True)
 class Recording:
-    """Spikes (T, H, W) uint8 of 0 and 1, the frame rate [Hz] where the file states it, and what else it says.
+    """A recording in memory.
 
-    >>> print(Recording(np.zeros((301, 250, 400), np.uint8), frame_rate_hz=40_000.0))
-    301 frames of 250 rows x 400 columns
+    Example:
+        >>> print(Recording(np.zeros((301, 250, 400), np.uint8), frame_rate_hz=40_000.0))
+        301 frames of 250 rows x 400 columns
     """
 
-    spikes: NDArray[np.uint8]
+    spikes: Spikes
+    """(T, H, W)."""
     frame_rate_hz: float | None = None
+    """Where the file states it."""
     attributes: dict[str, Any] = field(default_factory=dict)
+    """Everything else that the file states, and how it was read."""
 
     def __str__(self) -> str:
         """How it was read, e.g. `301 frames of 250 rows x 400 columns, flip`."""
@@ -49,62 +48,71 @@ class Recording:
 
 
 def read_recording(path: str | Path, **options: Any) -> Recording:
-    """Read a recording; the ending of its name says how, and which options there are.  All take first, count.
+    """Read a recording.  Warns (UserWarning) where the spikes show that it was read wrong.
 
-        .dat          read_dat: height, width, flip, bit_order, crop_width, layout
-        .raw, .bin    read_raw, one byte a pixel: height, width, flip, crop_width
-        .npz          load_npz: key, item, batch_axis, time_axis, flip, bit_order
-        .npy          read_npy: item, batch_axis, time_axis, flip
-        .mat          read_mat: key, item, batch_axis, time_axis, flip
-        .h5, .hdf5    of this package, read_hdf5: stream
-                      of others, read_foreign_hdf5: key, item, batch_axis, time_axis, flip
+    Args:
+        path: file; the ending of its name is its format.
+        options: first and count, and those of the format:
 
-    Warns (UserWarning) where the spikes say that it was read wrong.
-    Raises InputError for another ending, an option the format does not have, and all that its loader refuses.
+            .dat          height, width, flip, bit_order, crop_width, layout, as of `load_vidar_dat`
+            .raw, .bin    height, width, flip, crop_width: one byte a pixel
+            .npz          key, item, batch_axis, time_axis, flip, bit_order, as of `array_files.read_array_file`
+            .npy          item, batch_axis, time_axis, flip
+            .mat          key, item, batch_axis, time_axis, flip
+            .h5, .hdf5    stream ("spikes" or "clean") of this package's; of others as .mat
 
-    >>> save_npz("spikes.npz", np.zeros((8, 2, 3), np.uint8))
-    >>> print(read_recording("spikes.npz"))
-    8 frames of 2 rows x 3 columns, key spikes, time_axis 0
+    Raises:
+        InputError: another ending, an option that the format does not have, or a file that cannot be read.
+
+    Example:
+        >>> save_npz("spikes.npz", np.zeros((8, 2, 3), np.uint8))
+        >>> print(read_recording("spikes.npz"))
+        8 frames of 2 rows x 3 columns, key spikes, time_axis 0
     """
-    loader = _loader(path)
-    allowed = _options(loader)
-    for name in options:
-        if name not in allowed:
-            ending = Path(path).suffix.lower()
-            own = " of this package" if loader is read_hdf5 else ""
-            raise InputError(f"option {name} does not apply to {ending} files{own}; they take {', '.join(allowed)}")
-    spikes, attributes = loader(path, **options)
+    read, allowed = _reader(path)
+    own = " of this package" if read is read_hdf5 else ""
+    check_options(options, allowed, f"{Path(path).suffix.lower()} files{own}")
+    spikes, attributes = read(path, **options)
     return Recording(spikes, attributes.get("frame_rate_hz"), attributes)
 
 
+def check_options(options: Iterable[str], allowed: tuple[str, ...], kind: str) -> None:
+    """Raises InputError for the first option that a kind of stream does not have."""
+    for name in options:
+        if name not in allowed:
+            rest = f"; they take {', '.join(allowed)}" if allowed else ""
+            raise InputError(f"option {name} does not apply to {kind}{rest}")
+
+
 def reading_options(path: str | Path) -> tuple[str, ...]:
-    """Names of the options that apply to a recording, by its name, and for HDF5 by what is in it.
+    """Names of the options that apply to a recording, by its name, and for HDF5 by its content.
 
     Raises InputError for another ending, or no HDF5 file.
     """
-    return _options(_loader(path))
+    return _reader(path)[1]
 
 
-def _options(loader: Callable[..., Any]) -> tuple[str, ...]:
-    return tuple(name for name in inspect.signature(loader).parameters if name != "path")
-
-
-def _loader(path: str | Path) -> Callable[..., Any]:
-    ending = Path(path).suffix.lower()
-    if ending in (".h5", ".hdf5"):
-        return read_hdf5 if is_recording(path) else read_foreign_hdf5
-    if ending not in _LOADERS:
-        raise InputError(f"{path} ends in {ending!r}; a recording is one of {', '.join(ENDINGS)}")
-    return _LOADERS[ending]
-
-
-_LOADERS: dict[str, Callable[..., Any]] = {
-    ".dat": read_dat,
-    ".raw": read_raw,
-    ".bin": read_raw,
-    ".npz": load_npz,
-    ".npy": read_npy,
-    ".mat": read_mat,
+Reader = Callable[..., tuple[Spikes, dict[str, Any]]]
+_OF_BATCH = ("item", "batch_axis", "time_axis", "flip")
+_OF_RAW = ("height", "width", "flip", "crop_width")
+_FOREIGN: tuple[Reader, tuple[str, ...]] = (read_array_file, ("key", *_OF_BATCH))
+_READERS: dict[str, tuple[Reader, tuple[str, ...]]] = {
+    ".dat": (read_dat, (*_OF_RAW, "bit_order", "layout")),
+    ".raw": (read_raw, _OF_RAW),
+    ".bin": (read_raw, _OF_RAW),
+    ".npz": (read_array_file, ("key", *_OF_BATCH, "bit_order")),
+    ".npy": (read_array_file, _OF_BATCH),
+    ".mat": _FOREIGN,
 }
-ENDINGS = (*_LOADERS, ".h5", ".hdf5")
+ENDINGS = (*_READERS, *HDF5)
 """Of the names of files that `read_recording` reads."""
+
+
+def _reader(path: str | Path) -> tuple[Reader, tuple[str, ...]]:
+    """The function that reads a recording, and its options."""
+    ending = Path(path).suffix.lower()
+    if ending not in ENDINGS:
+        raise InputError(f"{path} ends in {ending!r}; a recording is one of {', '.join(ENDINGS)}")
+    own: tuple[Reader, tuple[str, ...]] = (read_hdf5, ("stream",))
+    read, options = _READERS[ending] if ending not in HDF5 else own if is_recording(path) else _FOREIGN
+    return read, (*options, "first", "count")

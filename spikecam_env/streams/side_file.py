@@ -1,4 +1,4 @@
-"""The geometry of a headerless file: what the caller says, else a side file, else the usual.
+"""The geometry of a headerless file: the caller's, else a side file's, else the usual.
 
     recording.dat.json  or  recording.json    {"height": 250, "width": 416, "crop_width": 400, "flip": true,
                                                "bit_order": "little", "frame_rate_hz": 20000}
@@ -40,7 +40,7 @@ class SideFile(Declared):
 
 @dataclass(frozen=True)
 class FrameLayout:
-    """How frames lie in a file.  source: where it is from: given, a side file's name, or usual."""
+    """How frames lie in a file."""
 
     height: int
     width: int
@@ -50,6 +50,7 @@ class FrameLayout:
     layout: Layout
     frame_rate_hz: float | None
     source: str
+    """Where it is from: "given", a side file's name, or "usual"."""
 
     @property
     def shape(self) -> tuple[int, int]:
@@ -62,7 +63,7 @@ class FrameLayout:
 
 
 def read_side_file(path: Path) -> tuple[SideFile, Path] | None:
-    """Entries and path of the file beside a recording; None where there is none; raises InputError for a wrong one."""
+    """Entries and path of the side file of a recording; None where there is none."""
     own = side_path(path)
     if own.is_file():
         return declared(SideFile, read_json(own), str(own)), own
@@ -90,15 +91,20 @@ def write_side_file(path: Path, entries: dict[str, Any]) -> None:
 def geometry(path: Path, given: dict[str, Any], usual: dict[str, Any]) -> FrameLayout:
     """The geometry of a recording.
 
-    given: the caller's options, None where he says nothing.  usual: height and width, and others, if nobody says.
-    Raises InputError for values out of range, a wrong side file, and where height or width is not known.
+    Args:
+        path: of the recording.
+        given: the caller's options; None where he leaves them open.
+        usual: values where neither caller nor side file has one.
+
+    Raises:
+        InputError: values out of range, a wrong side file, or no height or width.
     """
-    found = read_side_file(path)
-    side = {} if found is None else {k: v for k, v in found[0].model_dump().items() if v is not None}
+    beside = read_side_file(path)
+    side = {} if beside is None else {k: v for k, v in beside[0].model_dump().items() if v is not None}
     stated = {name: value for name, value in given.items() if value is not None}
     against = [f"{k}={stated[k]!r}, not {side[k]!r}" for k in sorted(stated.keys() & side) if stated[k] != side[k]]
-    if found is not None and against:
-        warnings.warn(f"{path} is read with {', '.join(against)} as {found[1].name} says", UserWarning, stacklevel=4)
+    if beside is not None and against:
+        warnings.warn(f"{path} is read with {', '.join(against)} as {beside[1].name} says", UserWarning, stacklevel=4)
     taken = {"flip": False, "bit_order": "little", **usual, **side, **stated}
     missing = [name for name in ("height", "width") if name not in taken]
     if missing:
@@ -121,7 +127,7 @@ def geometry(path: Path, given: dict[str, Any], usual: dict[str, Any]) -> FrameL
         crop,
         taken.get("layout", "bits"),
         taken.get("frame_rate_hz"),
-        "given" if {"height", "width"} <= stated.keys() else found[1].name if found is not None else "usual",
+        "given" if {"height", "width"} <= stated.keys() else beside[1].name if beside is not None else "usual",
     )
 
 

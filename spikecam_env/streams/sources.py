@@ -28,9 +28,9 @@ from numpy.typing import NDArray
 
 from spikecam_env.errors import InputError, shown
 from spikecam_env.renamed import old_names
-from spikecam_env.streams.hdf5 import is_recording, open_recording
+from spikecam_env.streams.hdf5 import HDF5, is_recording, open_recording
 from spikecam_env.streams.packing import pack_checked, packed_bytes, unpack_frames
-from spikecam_env.streams.recording import read_recording
+from spikecam_env.streams.recording import check_options, read_recording
 from spikecam_env.streams.side_file import FrameLayout, geometry
 from spikecam_env.streams.vidar import USUAL, read_dat
 
@@ -42,7 +42,7 @@ except ImportError:  # Windows
 Packed = NDArray[np.uint8]
 """(frames, ceil(H W / 8))."""
 Receive = Callable[[memoryview], int]
-"""Puts bytes that have come into a buffer, and says how many; 0 at the end of a stream."""
+"""Puts bytes that have come into a buffer; returns their number, 0 at the end of a stream."""
 
 FRAME_RATE_HZ = 40_000.0
 """Of a stream that does not say: the Vidar camera's."""
@@ -55,7 +55,6 @@ PIPE_BYTES = 1 << 20
 most that Linux gives a user."""
 SET_PIPE_SIZE = 1031
 """F_SETPIPE_SZ of Linux; Python has the name from 3.10 on, there alone."""
-HDF5 = (".h5", ".hdf5")
 _REVERSED = np.packbits(np.unpackbits(np.arange(256, dtype=np.uint8)[:, None], axis=1)[:, ::-1], axis=1)[:, 0]
 """(256,) a byte with its bits in the other order."""
 FLOWING = ("height", "width", "crop_width", "flip", "bit_order")
@@ -67,7 +66,7 @@ class Source(Protocol):
 
     @property
     def title(self) -> str:
-        """What it is called."""
+        """Its name."""
 
     @property
     def shape(self) -> tuple[int, int]:
@@ -79,11 +78,11 @@ class Source(Protocol):
 
     @property
     def waits(self) -> bool:
-        """Whether frames wait until they are asked for, as those of a file do."""
+        """Whether frames wait to be read, as those of a file do."""
 
     @property
     def cut(self) -> str:
-        """What is wrong with how the stream ended, once it has; nothing where that is not known."""
+        """The fault of the end of the stream, once it has ended; empty where none is known."""
 
     def read(self, rows: Packed) -> int:
         """Fill rows with the next frames, from the first row on; how many, 0 at the end of the stream."""
@@ -94,14 +93,16 @@ class Source(Protocol):
 
 @dataclass
 class StoredFrames:
-    """Frames of a file.  fetch: fills rows with the frames from a number on.  loop: begin again at the end."""
+    """Frames of a file."""
 
     title: str
     shape: tuple[int, int]
     frame_rate_hz: float
     frames: int
     fetch: Callable[[int, Packed], object]
+    """Fills rows with the frames from a number on."""
     loop: bool = False
+    """Begin again at the end."""
     waits: bool = field(default=True, init=False)
     cut: str = field(default="", init=False)
     _next: int = field(default=0, init=False)
@@ -121,10 +122,7 @@ class StoredFrames:
 
 @dataclass
 class Flowing:
-    """Frames that a pipe or a socket brings, one after the other as `taken` says.
-
-    receive: what has come, into a buffer, and how many bytes; 0 at the end.
-    """
+    """Frames that a pipe or a socket brings, one after the other, in the layout `taken`."""
 
     title: str
     taken: FrameLayout
@@ -163,12 +161,15 @@ class Flowing:
 
 @contextmanager
 def open_source(where: str, *, loop: bool = False, **options: Any) -> Iterator[Source]:
-    """The stream at `where`, open inside the `with` block; see the module for what that can be.
+    """The stream at an address, open inside the `with` block.  Warns as `read_recording` does.
 
-    loop: a recording begins again when it is over.  options: of `read_recording`; of pipes and sockets height, width,
-    crop_width, flip and bit_order.
-    Warns as `read_recording` does.
-    Raises InputError for what cannot be opened or read, and for options that do not apply.
+    Args:
+        where: an address that the module lists.
+        loop: a recording begins again when it is over.
+        options: of `read_recording`; of pipes and sockets height, width, crop_width, flip and bit_order.
+
+    Raises:
+        InputError: a stream that cannot be opened or read, or options that do not apply.
     """
     with ExitStack() as stack:
         if is_flow(where):
@@ -182,7 +183,12 @@ def open_source(where: str, *, loop: bool = False, **options: Any) -> Iterator[S
 def turned(packed: Packed, taken: FrameLayout) -> Packed:
     """Frames as they lie in a file -> as this package packs them: columns kept, rows from the top, bits little-endian.
 
-    packed: (T, ceil(height width / 8)) -> (T, ceil(height columns / 8)), columns being crop_width where it is given.
+    Args:
+        packed: (T, ceil(height width / 8)).
+        taken: the layout of the file.
+
+    Returns:
+        (T, ceil(height columns / 8)), columns being crop_width where it is given.
     """
     columns = _columns(taken)
     if taken.width % 8 or columns % 8:
@@ -200,7 +206,7 @@ def is_flow(where: str) -> bool:
         return True
     try:
         kind = os.stat(where).st_mode
-    except (OSError, ValueError):  # no such file, or a zero in its name: said where it is opened
+    except (OSError, ValueError):  # no such file, or a zero in its name: an error where it is opened
         return False
     return stat.S_ISFIFO(kind) or stat.S_ISSOCK(kind)
 
@@ -231,11 +237,12 @@ def _columns(taken: FrameLayout) -> int:
 def _stored(path: Path, loop: bool, options: dict[str, Any], stack: ExitStack) -> StoredFrames:
     ending = path.suffix.lower()
     if ending == ".dat":
-        how = read_dat(path, count=1, **_only(options, (*FLOWING, "layout"), f"{ending} files"))[1]
+        check_options(options, (*FLOWING, "layout"), f"{ending} files")
+        how = read_dat(path, count=1, **options)[1]
         if how["layout"] == "bits":
             return _dat_file(path, loop, how, stack)
     elif ending in HDF5 and is_recording(path):
-        _only(options, (), f"{ending} files of this package")
+        check_options(options, (), f"{ending} files of this package")
         return _own_recording(path, loop, stack)
     recording = read_recording(path, **options)
     packed = pack_checked(recording.spikes)
@@ -289,8 +296,8 @@ def _own_recording(path: Path, loop: bool, stack: ExitStack) -> StoredFrames:
 
 def _flowing(where: str, options: dict[str, Any], stack: ExitStack) -> Flowing:
     title = "standard input" if where == STANDARD_INPUT else where
-    given = {name: None for name in FLOWING} | _only(options, FLOWING, "pipes and sockets")
-    taken = geometry(Path(where), given, USUAL)
+    check_options(options, FLOWING, "pipes and sockets")
+    taken = geometry(Path(where), options, USUAL)
     if where == STANDARD_INPUT:
         if os.isatty(0):
             raise InputError("standard input is a terminal; pipe packed frames into it, e.g. with < recording.dat")
@@ -335,15 +342,6 @@ def _of_pipe(number: int) -> Receive:
         with suppress(OSError):  # no pipe, or no right to so large a one
             fcntl.fcntl(number, SET_PIPE_SIZE, PIPE_BYTES)
     return lambda room: os.readv(number, [room])
-
-
-def _only(options: dict[str, Any], allowed: tuple[str, ...], what: str) -> dict[str, Any]:
-    """The options; raises InputError for one that does not apply."""
-    for name in options:
-        if name not in allowed:
-            rest = f"; they take {', '.join(allowed)}" if allowed else ""
-            raise InputError(f"option {name} does not apply to {what}{rest}")
-    return options
 
 
 __getattr__ = old_names(__name__, {"Stored": "StoredFrames"})

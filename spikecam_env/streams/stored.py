@@ -29,15 +29,15 @@ from numpy.typing import NDArray
 
 from spikecam_env.checked import checked_whole
 from spikecam_env.errors import InputError, shown
-from spikecam_env.streams.files import check_range
 from spikecam_env.streams.geometry import KNOWN_SHAPES
+from spikecam_env.streams.packing import check_range
 
 EIGHT_BITS = (np.uint8, np.int8, np.bool_)
 
 
 @dataclass(frozen=True)
 class Choice:
-    """What the caller says of the stream in a file; None where the file or the spikes are to say."""
+    """The caller's options for the stream in a file; None where file or spikes decide."""
 
     key: str | None = None
     item: int | None = None
@@ -55,9 +55,12 @@ class Choice:
 
 
 def stream_key(arrays: Mapping[str, Any], key: str | None, path: str | Path) -> str:
-    """The name of the array to read: the one asked, else the only one that can be a stream or a batch of them.
+    """The name of the array to read: the key, else the only one that can be a stream or a batch of them.
 
-    arrays: by name, anything with ndim, shape and dtype.
+    Args:
+        arrays: by name, anything with ndim, shape and dtype.
+        key: of the caller.
+        path: for messages.
     """
     if key is not None and key in arrays:
         return key
@@ -81,10 +84,17 @@ def stream_key(arrays: Mapping[str, Any], key: str | None, path: str | Path) -> 
 def one_stream(
     array: NDArray[Any], choice: Choice, path: str | Path, key: str, stated: int | None = None
 ) -> tuple[NDArray[np.uint8], dict[str, Any]]:
-    """(T, H, W) uint8 spikes out of an array of a file, and how they were read: key, time_axis, time_axis_from, item.
+    """The stream in an array of a file.
 
-    stated: the axis of time that the file names, if it does.
-    Raises InputError for other axes or dtypes, values that are not 0 and 1, and a time axis that nothing decides.
+    Args:
+        array: of 3 or 4 axes.
+        choice: the caller's options.
+        path: for messages.
+        key: name of the array.
+        stated: axis of time that the file names, if it does.
+
+    Returns:
+        (T, H, W) spikes, and how they were read: key, time_axis, time_axis_from, item.
     """
     stored = as_bytes(one_item(array, choice, path, key), path, key)
     axis, source = time_axis(stored, choice.time_axis, stated, path)
@@ -95,7 +105,7 @@ def one_stream(
 
 
 def one_item(array: NDArray[Any], choice: Choice, path: str | Path, key: str) -> NDArray[Any]:
-    """The array itself, or the stream of a batch that was asked."""
+    """The array itself, or the chosen stream of a batch."""
     if array.ndim != 4:
         if choice.item is not None:
             raise InputError(f"{path}: {key} has shape {array.shape}, which is no batch of streams; leave item")
@@ -130,7 +140,7 @@ def as_bytes(array: NDArray[Any], path: str | Path, key: str) -> NDArray[np.uint
 
 
 def ordered(stored: NDArray[np.uint8], axis: int, choice: Choice, path: str | Path) -> NDArray[np.uint8]:
-    """The frames asked, time first, upside down if `flip`."""
+    """The chosen frames, time first, upside down if `flip`."""
     spikes = np.moveaxis(stored, axis, 0)
     first, stop = check_range(choice.first, choice.count, len(spikes), str(path))
     return np.ascontiguousarray(spikes[first:stop, ::-1] if choice.flip else spikes[first:stop])
@@ -161,7 +171,7 @@ def time_axis(stored: NDArray[np.uint8], given: int | None, stated: int | None, 
                     f"{path} of shape {stored.shape} is read with time_axis={axis}; "
                     f"its spikes say time_axis={silent[0]}",
                     UserWarning,
-                    stacklevel=6,
+                    stacklevel=5,
                 )
             return int(axis), source
     if len(silent) == 1:

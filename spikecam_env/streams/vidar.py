@@ -3,14 +3,14 @@
 A frame is ceil(H W / 8) bytes, rows from the top, row-major, first pixel in the least significant bit.
 Known variants, by option:
 
-    public Vidar files     250 x 400, flip=True (rows are stored from the bottom)
-    416-wide dumps         width=416, crop_width=400
-    SPIFT, PHM             height=500, width=800, not flipped
-    big-endian dumps       bit_order="big"
-    SPS100 dumps           layout="packets", 1000 x 1000, see `packets`
+- public Vidar files: 250 x 400, flip=True (rows are stored from the bottom);
+- 416-wide dumps: width=416, crop_width=400;
+- SPIFT, PHM: height=500, width=800, not flipped;
+- big-endian dumps: bit_order="big";
+- SPS100 dumps: layout="packets", 1000 x 1000, see `packets`.
 
 Nothing in the file says which: geometry and flip are the caller's to give, or a side file's (`side_file`).  The spikes
-say when it is wrong (`geometry`), and the loaders warn.  Source: DESIGN section 5.
+show when it is wrong (`geometry`), and the loaders warn.
 """
 
 from __future__ import annotations
@@ -21,15 +21,23 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from spikecam_env.checked import checked_memory
 from spikecam_env.errors import InputError
 from spikecam_env.streams import packets
-from spikecam_env.streams.files import check_range
 from spikecam_env.streams.geometry import KNOWN_SHAPES, geometry_doubt, looks_right
-from spikecam_env.streams.packing import BitOrder, as_spikes, check_values, pack_checked, packed_bytes, unpack_frames
+from spikecam_env.streams.packing import (
+    BitOrder,
+    as_spikes,
+    check_range,
+    check_values,
+    pack_checked,
+    packed_bytes,
+    unpack_frames,
+)
 from spikecam_env.streams.side_file import FrameLayout, Layout, geometry, write_side_file
+from spikecam_env.types import Spikes
 from spikecam_env.untrusted import existing_file
 from spikecam_env.whole import whole_file
 
@@ -50,73 +58,60 @@ def load_vidar_dat(
     layout: Layout | None = None,
     first: int = 0,
     count: int | None = None,
-) -> NDArray[np.uint8]:
-    """A `.dat` file -> (count, height, crop_width or width) uint8 of 0 and 1; only the frames asked are read.
+) -> Spikes:
+    """Read frames of a `.dat` file.
 
-    height, width: default the side file's, else 250 x 400.  flip: turn each frame upside down, as public Vidar files
-    need.  bit_order: little, or big.  crop_width: keep that many columns from the left.  layout: bits, or packets.
-    first, count: frames to read, default all.
-    Warns (UserWarning) where the spikes say that the geometry is wrong, where the last frame is cut, and where an
-    option is not what the side file says.
-    Raises InputError if the file is absent or holds no frame, its size is a whole number of frames of another known
-    geometry only, or the frames or columns asked are not in it.
+    Warns (UserWarning) where the spikes show that the geometry is wrong, where the last frame is cut, and where the
+    side file states another value than an option.
 
-    >>> spikes = np.uint8([[[1, 0, 0, 1, 0, 0, 0, 0]], [[0, 0, 1, 0, 0, 0, 0, 0]]])
-    >>> save_vidar_dat("spikes.dat", spikes)
-    >>> bool((load_vidar_dat("spikes.dat", height=1, width=8, flip=False) == spikes).all())
-    True
+    Args:
+        path: file.
+        height: rows; default the side file's, else 250.
+        width: columns of the file; default the side file's, else 400.
+        flip: turn each frame upside down, as public Vidar files need.
+        bit_order: "little" or "big".
+        crop_width: columns to keep, from the left.
+        layout: "bits" or "packets".
+        first: first frame to read.
+        count: frames to read; default all.
+
+    Returns:
+        (count, height, crop_width or width) spikes.
+
+    Raises:
+        InputError: the file is absent or holds no frame, its size is a whole number of frames of another known geometry
+            only, or frames or columns are not in it.
+
+    Example:
+        >>> spikes = np.uint8([[[1, 0, 0, 1, 0, 0, 0, 0]], [[0, 0, 1, 0, 0, 0, 0, 0]]])
+        >>> save_vidar_dat("spikes.dat", spikes)
+        >>> bool((load_vidar_dat("spikes.dat", height=1, width=8, flip=False) == spikes).all())
+        True
     """
-    return read_dat(
-        path,
-        height=height,
-        width=width,
-        flip=flip,
-        bit_order=bit_order,
-        crop_width=crop_width,
-        layout=layout,
-        first=first,
-        count=count,
-    )[0]
+    given = {"height": height, "width": width, "flip": flip, "bit_order": bit_order, "crop_width": crop_width}
+    return read_dat(path, first=first, count=count, layout=layout, **given)[0]
 
 
 def read_dat(
-    path: str | Path,
-    *,
-    height: int | None = None,
-    width: int | None = None,
-    flip: bool | None = None,
-    bit_order: BitOrder | None = None,
-    crop_width: int | None = None,
-    layout: Layout | None = None,
-    first: int = 0,
-    count: int | None = None,
-) -> tuple[NDArray[np.uint8], dict[str, Any]]:
-    """As `load_vidar_dat`, and the geometry that was taken: height, width, flip, ..., geometry_from, frame_rate_hz."""
+    path: str | Path, *, first: int = 0, count: int | None = None, **given: Any
+) -> tuple[Spikes, dict[str, Any]]:
+    """As `load_vidar_dat`, and the layout of the file: height, width, flip, ..., geometry_from, frame_rate_hz."""
     source = existing_file(path)
-    given = {"height": height, "width": width, "flip": flip, "bit_order": bit_order, "crop_width": crop_width}
-    usual = USUAL if layout != "packets" else dict(zip(("height", "width"), packets.SHAPE, strict=True))
-    taken = geometry(source, {**given, "layout": layout}, usual)
+    usual = USUAL if given.get("layout") != "packets" else dict(zip(("height", "width"), packets.SHAPE, strict=True))
+    taken = geometry(source, given, usual)
     spikes = (_from_packets if taken.layout == "packets" else _from_bits)(source, taken, first, count)
     return _turned(spikes, taken), taken.attributes()
 
 
 def read_raw(
-    path: str | Path,
-    *,
-    height: int | None = None,
-    width: int | None = None,
-    flip: bool | None = None,
-    crop_width: int | None = None,
-    first: int = 0,
-    count: int | None = None,
-) -> tuple[NDArray[np.uint8], dict[str, Any]]:
-    """A file of one byte a pixel, 0 or 1 -> (T, H, W) uint8 spikes and the geometry, as `read_dat`.
+    path: str | Path, *, first: int = 0, count: int | None = None, **given: Any
+) -> tuple[Spikes, dict[str, Any]]:
+    """A file of one byte a pixel, 0 or 1 -> (T, H, W) spikes and the layout, as `read_dat`.
 
-    height, width: needed, here or in the side file.
-    Raises InputError as `load_vidar_dat`, and for bytes that are neither 0 nor 1.
+    Height and width are needed, here or in the side file.
     """
     source = existing_file(path)
-    taken = geometry(source, {"height": height, "width": width, "flip": flip, "crop_width": crop_width}, {})
+    taken = geometry(source, given, {})
     size = taken.height * taken.width
     first, stop = check_range(first, count, _whole_frames(source, size, taken), str(source))
     frames = _read(source, first * size, (stop - first) * size).reshape(-1, *taken.shape)
@@ -138,12 +133,19 @@ def save_vidar_dat(
 ) -> None:
     """(T, H, W) spikes -> a `.dat` file that `load_vidar_dat` reads with the same options.  The file appears whole.
 
-    side_file: also write its geometry to `<name>.dat.json`, so that it reads without options; frame_rate_hz goes there.
+    Args:
+        path: file.
+        spikes: (T, H, W).
+        flip: store rows from the bottom.
+        bit_order: "little" or "big".
+        side_file: also write the geometry to `<name>.dat.json`, so that the file reads without options.
+        frame_rate_hz: for the side file.
 
-    >>> from pathlib import Path
-    >>> save_vidar_dat("spikes.dat", np.zeros((3, 2, 8), np.uint8))
-    >>> Path("spikes.dat").stat().st_size
-    6
+    Example:
+        >>> from pathlib import Path
+        >>> save_vidar_dat("spikes.dat", np.zeros((3, 2, 8), np.uint8))
+        >>> Path("spikes.dat").stat().st_size
+        6
     """
     frames = as_spikes(spikes)
     packed = pack_checked(frames[:, ::-1] if flip else frames, bit_order)
@@ -154,7 +156,7 @@ def save_vidar_dat(
             write_side_file(Path(path), {**entries, "frame_rate_hz": frame_rate_hz})
 
 
-def _from_bits(source: Path, taken: FrameLayout, first: int, count: int | None) -> NDArray[np.uint8]:
+def _from_bits(source: Path, taken: FrameLayout, first: int, count: int | None) -> Spikes:
     size = packed_bytes(taken.shape)
     frames = _whole_frames(source, size, taken)
     first, stop = check_range(first, count, frames, str(source))
@@ -170,7 +172,7 @@ def _from_bits(source: Path, taken: FrameLayout, first: int, count: int | None) 
     return unpack_frames(packed, taken.shape, bit_order=taken.bit_order)
 
 
-def _from_packets(source: Path, taken: FrameLayout, first: int, count: int | None) -> NDArray[np.uint8]:
+def _from_packets(source: Path, taken: FrameLayout, first: int, count: int | None) -> Spikes:
     if taken.shape != packets.SHAPE:
         raise InputError(
             f"{source}: packets are of 1000 x 1000 pixels, not {taken.height} x {taken.width}; leave height and width"
@@ -180,12 +182,12 @@ def _from_packets(source: Path, taken: FrameLayout, first: int, count: int | Non
     return packets.read_frames(source, offset, first, stop - first)
 
 
-def _turned(spikes: NDArray[np.uint8], taken: FrameLayout) -> NDArray[np.uint8]:
+def _turned(spikes: Spikes, taken: FrameLayout) -> Spikes:
     spikes = spikes[:, :, : taken.crop_width]
     return np.ascontiguousarray(spikes[:, ::-1] if taken.flip else spikes)
 
 
-def _read(source: Path, offset: int, size: int) -> NDArray[np.uint8]:
+def _read(source: Path, offset: int, size: int) -> Spikes:
     checked_memory(size, str(source))
     try:
         read = np.fromfile(source, np.uint8, count=size, offset=offset)
@@ -229,7 +231,7 @@ def _doubt_of(source: Path, taken: FrameLayout) -> str:
 
 @lru_cache(maxsize=256)
 def _doubt(path: str, changed_ns: int, size: int, shape: tuple[int, int], bit_order: BitOrder) -> str:
-    """What the middle of a file says against a geometry; once a file, however often it is read in parts."""
+    """The doubt about a geometry by the middle of a file; once a file, however often it is read in parts."""
     probe = _probe(Path(path), packed_bytes(shape))
     if packets.looks_like_packets(probe.ravel()):
         return "it looks like the 64-byte packets of a megapixel camera; give layout='packets'"
@@ -237,7 +239,7 @@ def _doubt(path: str, changed_ns: int, size: int, shape: tuple[int, int], bit_or
     return str(doubt) if doubt else ""
 
 
-def _probe(source: Path, frame: int) -> NDArray[np.uint8]:
+def _probe(source: Path, frame: int) -> Spikes:
     frames = source.stat().st_size // frame
     count = min(frames, PROBE, max(2, (1 << 21) // frame))
     return np.fromfile(source, np.uint8, count * frame, offset=(frames - count) // 2 * frame).reshape(-1, frame)

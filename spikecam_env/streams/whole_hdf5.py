@@ -1,8 +1,8 @@
 """An HDF5 file that appears whole, on a disk that may fill up.
 
 HDF5 does not bear a write that fails: it drops errors of closing datasets, and crashes when the process ends.  So it
-writes to a `_Disk` that takes everything: after the first failure it keeps in memory what HDF5 writes until the file is
-closed, which is what its caches hold.  The failure is raised by `WholeHDF5`.
+writes to a `_Disk` that takes everything: after the first failure it keeps later writes in memory until the file is
+closed.  These are no more than the caches of HDF5.  `WholeHDF5` raises the failure.
 """
 
 from __future__ import annotations
@@ -21,11 +21,18 @@ from spikecam_env.whole import said_of, whole_file
 class WholeHDF5:
     """A new HDF5 file, open for writing; it replaces `path` when the `with` block ends without an exception.
 
-        with WholeHDF5("maps.h5") as file:
-            file["gain"] = gain
+    The same calls write the same bytes.
 
-    options: of `h5py.File`.  The same calls write the same bytes.
-    Errors: InputError if nothing can be written at `path`, or writing fails.
+    Args:
+        path: of the file.
+        options: of `h5py.File`.
+
+    Raises:
+        InputError: nothing can be written at `path`, or writing fails.
+
+    Example:
+        >>> with WholeHDF5("maps.h5") as file:
+        ...     file["gain"] = [1.0, 0.9]
     """
 
     def __init__(self, path: str | Path, **options: Any) -> None:
@@ -48,7 +55,7 @@ class WholeHDF5:
         self._ends.__exit__(kind, error, trace)
 
     def check(self) -> None:
-        """Raise what has failed so far."""
+        """Raise the first failure so far."""
         failure = self._disk and self._disk.failure
         if failure:
             with said_of(self._path):
@@ -56,7 +63,7 @@ class WholeHDF5:
 
 
 class _Disk(io.RawIOBase):
-    """A file of which no call fails.  failure: the first that should have; from then on writes stay in memory."""
+    """A file of which no call fails; from the first `failure` on writes stay in memory."""
 
     def __init__(self, path: Path) -> None:
         self._file = io.FileIO(path, "w+")
@@ -107,7 +114,7 @@ class _Disk(io.RawIOBase):
         return len(block)
 
     def readinto(self, buffer: Any, /) -> int:
-        """What was written last, kept in memory or not; zeros where nothing was."""
+        """Read the bytes written last, kept in memory or not; zeros where there are none."""
         view = memoryview(buffer).cast("B")
         count = max(0, min(len(view), self._size - self._at))
         self._file.seek(self._at)

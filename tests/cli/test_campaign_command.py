@@ -10,13 +10,9 @@ import pytest
 
 from spikecam_env.campaign import read_campaign
 from spikecam_env.cli.camera import CameraOptions
-from spikecam_env.cli.main import run
 from spikecam_env.sensor import CATALOGUE, SensorModel
 from spikecam_env.streams import load_vidar_dat, save_npz
-
-
-def spikecam(*args: object) -> int:
-    return run([str(a) for a in args])
+from tests.commands import spikecam
 
 
 def test_simulate_writes_the_model_asked_for(tmp_path: Path, capsys) -> None:
@@ -79,48 +75,3 @@ def test_effects_explains_one(capsys) -> None:
     assert spikecam("effects", "show", "dead_time") == 0
     printed = capsys.readouterr().out
     assert "T = 1/x + tau" in printed and "0 .. 25" in printed and "Seen in: flats at x > 0.3" in printed
-
-
-@pytest.mark.parametrize(
-    ("options", "message"),
-    [
-        (("--effect", "dead_tme"), "unknown effect 'dead_tme'; choose one of afterpulsing"),
-        (("--effect", "dead_tme"), "vignetting (dead_time?)"),
-        (("--effect", "dead_time:tau=1"), "unknown parameter of dead_time 'tau'; choose one of tau_us"),
-        (("--effect", "dead_time:tau_us"), "tau_us has no value"),
-        (("--effect", "dead_time:tau_us=far"), "dead_time.tau_us = 'far'; it must be a number"),
-        (("--effect", "dead_time:tau_us=90"), "outside 0 .. 25 us"),
-        (("--effect", "afterpulsing:delay_frames=2.5"), "must be a whole number"),
-        (("--effect", "shot_noise:dark_is_noisy=maybe"), "must be true or false"),
-        (("--without", "dead_time"), "unknown effect of scsim 'dead_time'"),
-        (("--recording", "film"), "unknown recording 'film'; choose one of bars, dark, disk, flat, masked_rows, step"),
-        (("--recording", "flat"), "needs radiance; write flat:radiance=..."),
-        (("--recording", "flat:radiance=-1"), "negative"),
-        (("--recording", "bars:speed=9"), "at most 1.2 pixels a frame"),
-        (("--frames", "0"), "--frames 0; it must be"),
-        (("--second-v-d", "0.001"), "is outside 0.05 .. 20 V"),
-    ],
-)
-def test_bad_options_end_in_one_line(options, message: str, tmp_path: Path, capsys) -> None:
-    assert spikecam("campaign", "simulate", tmp_path / "c", *options) == 2
-    error = capsys.readouterr().err.strip().splitlines()[-1]
-    assert error.startswith("spikecam: ") and message in error
-    assert not list(tmp_path.glob("c/*.dat"))
-
-
-@pytest.mark.parametrize(
-    ("options", "message"),
-    [
-        ((), "no labels"),
-        (("--label", "a.npz"), "not of the form FILE=RADIANCE"),
-        (("--label", "a.npz="), "the radiance is missing"),
-        (("--label", "a.npz=bright"), "radiance is 'bright'"),
-        (("--label", "b.npz=0.2"), "there is no file"),
-        (("--table", "none.csv"), "there is no file none.csv"),
-    ],
-)
-def test_bad_labels_end_in_one_line(options, message: str, tmp_path: Path, capsys) -> None:
-    assert spikecam("campaign", "import", tmp_path, tmp_path / "out", *options) == 2
-    error = capsys.readouterr().err.strip().splitlines()[-1]
-    assert error.startswith("spikecam: ") and message in error
-    assert not (tmp_path / "out").exists()

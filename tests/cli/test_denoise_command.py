@@ -5,24 +5,18 @@ from __future__ import annotations
 import json
 from pathlib import Path
 
-import av
-import imageio.v2 as imageio
 import numpy as np
 import pytest
 from PIL import Image
 
 from denoiser import denoise
 from denoiser.metrics import psnr_db
-from spikecam_env.cli.main import run
 from spikecam_env.cli.panels import MARGIN, panel_scale
 from spikecam_env.streams import SpikeWriter, middleTFP, read_recording, read_truth, save_npz, save_vidar_dat
+from tests.commands import film_in, picture_in, spikecam
 
 SHAPE = (64, 96)
 FRAMES = 130
-
-
-def spikecam(*args: object) -> int:
-    return run([str(word) for word in args])
 
 
 @pytest.fixture(scope="module")
@@ -50,9 +44,8 @@ def alike(shown: np.ndarray, picture: np.ndarray) -> float:
 
 def test_the_last_panel_is_the_rate_of_one_frame_in_the_picture_and_in_the_film(disk: Path) -> None:
     rates = denoise(read_recording(disk).spikes, output="rate")
-    picture = imageio.imread(disk.with_name("out") / "pictures.png")
-    with av.open(str(disk.with_name("out") / "film.mp4")) as film:
-        frames = [frame.to_ndarray(format="rgb24") for frame in film.decode(video=0)]
+    picture = picture_in(disk.with_name("out") / "pictures.png")
+    frames = film_in(disk.with_name("out") / "film.mp4")
     first = 20  # the middle of the first whole window: the film has every frame from it on
     for what, shown, at, least in (
         ("picture", picture, FRAMES // 2, 0.9999),  # 8 bits of grey
@@ -65,7 +58,7 @@ def test_the_last_panel_is_the_rate_of_one_frame_in_the_picture_and_in_the_film(
 
 
 def test_pictures_of_spikes_are_means_of_the_window(disk: Path) -> None:
-    picture = imageio.imread(disk.with_name("out") / "pictures.png")
+    picture = picture_in(disk.with_name("out") / "pictures.png")
     for number, file in enumerate((disk, disk.with_name("out") / "denoised.h5")):
         spikes = read_recording(file).spikes
         assert alike(panel(picture, number), middleTFP(spikes, FRAMES // 2, 41)) > 0.999
@@ -81,7 +74,7 @@ def test_a_recording_has_the_light_of_its_middle_and_is_judged_by_it(disk: Path)
     print(scores)
     assert scores["denoised rate", "one frame"] == pytest.approx(psnr_db(rate, light, light.max()))
     assert scores["denoised rate", "one frame"] > scores["noisy spikes", "mean of 41 frames"]
-    assert alike(panel(imageio.imread(disk.with_name("out") / "pictures.png"), 3), light) > 0.999
+    assert alike(panel(picture_in(disk.with_name("out") / "pictures.png"), 3), light) > 0.999
 
 
 @pytest.mark.parametrize("suffix", [".dat", ".npz"])
@@ -119,7 +112,7 @@ def test_a_dark_recording_is_shown_black(tmp_path: Path, capsys) -> None:
         writer.append_truth(32.5, radiance=np.zeros(SHAPE, np.float32))
     assert spikecam("denoise", tmp_path / "dark.h5", "--out", tmp_path / "out", "--no-film") == 0
     assert "nan" not in capsys.readouterr().out
-    picture = imageio.imread(tmp_path / "out" / "pictures.png")
+    picture = picture_in(tmp_path / "out" / "pictures.png")
     assert panel(picture, 0).max() == 0
 
 

@@ -1,4 +1,4 @@
-"""`spikecam film`: what people film, as spikes; printed as it was done, and named where it cannot be."""
+"""`spikecam film`: films of users as spikes; the table states how, an error names the fault."""
 
 from __future__ import annotations
 
@@ -9,14 +9,10 @@ import pytest
 from made_films import greys, write_film
 from PIL import Image
 
-from spikecam_env.cli.main import run
 from spikecam_env.streams import middleTFP, read_recording
+from tests.commands import spikecam
 
 SMALL = ("--size", "16", "24")
-
-
-def spikecam(*args: object) -> int:
-    return run([str(a) for a in args])
 
 
 def printed(capsys: pytest.CaptureFixture[str]) -> dict[str, str]:

@@ -1,4 +1,4 @@
-"""What is given twice: of two values the command takes neither, and says which it is."""
+"""Options, entries and arrays that are given twice are refused by name."""
 
 from __future__ import annotations
 

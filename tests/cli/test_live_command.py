@@ -10,26 +10,21 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-import imageio.v2 as imageio
 import numpy as np
 import pytest
 
 from scenes import RotatingDisk
 from spikecam_env.cli.live.live_screen import LiveScreen
 from spikecam_env.cli.live.simulated import SimulatedSource
-from spikecam_env.cli.main import run
 from spikecam_env.cli.panels import MARGIN, display
 from spikecam_env.sensor import SpikeSensor
 from spikecam_env.streams import pack_frames, save_vidar_dat
+from tests.commands import film_in, spikecam
 
 SHAPE = (24, 40)
 SIZE = ("--height", 24, "--width", 40)
 SCALE = 8
 """Pixels of the screen a pixel of so small a picture takes, each way."""
-
-
-def spikecam(*args: object) -> int:
-    return run([str(a) for a in args])
 
 
 @pytest.fixture(autouse=True)
@@ -93,7 +88,7 @@ def test_a_film_is_what_a_window_would_show(recording: Path, capsys, tmp_path: P
     assert spikecam("live", recording, "--loop", "--seconds", 1.5, "--speed", 0.02, "--film", film) == 0
     printed = capsys.readouterr().out
     assert printed.endswith(f"wrote {film}\n")
-    pictures = [picture[..., 0].astype(float) for picture in imageio.get_reader(film)]
+    pictures = [picture[..., 0].astype(float) for picture in film_in(film)]
     assert 0.5 * 30 <= len(pictures) <= (figures(printed)["seconds"] + 0.2) * 30
     rows, columns = SHAPE[0] * SCALE, SHAPE[1] * SCALE
     noisy, clean = (pictures[-1][MARGIN : MARGIN + rows, left:][:, :columns] for left in (MARGIN, 2 * MARGIN + columns))
@@ -181,7 +176,7 @@ def test_in_a_window_escape_ends_an_endless_stream(recording: Path, monkeypatch:
             return ["escape"] if len(shown) > 3 else []
 
     monkeypatch.setattr("spikecam_env.cli.live.window.has_display", lambda: True)
-    monkeypatch.setattr("spikecam_env.cli.live.window.Window", Window)
+    monkeypatch.setattr("spikecam_env.cli.live.window.DisplayWindow", Window)
     assert spikecam("live", recording, "--loop", "--speed", 0.05) == 0
     assert len(shown) == 4 and len({picture.shape for picture in shown}) == 1
     assert figures(capsys.readouterr().out)["pictures"] >= 4

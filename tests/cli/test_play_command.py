@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Iterator
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
 import gymnasium
-import imageio.v2 as imageio
 import numpy as np
 import pytest
 
@@ -20,12 +18,8 @@ from spikecam_env.cli.live.keys import action_of, explained, plain
 from spikecam_env.cli.live.pictures import Denoised, Noisy
 from spikecam_env.cli.live.players import Player, player, steering
 from spikecam_env.cli.live.screen import AIM, TARGET, Screen
-from spikecam_env.cli.main import run
 from spikecam_env.envs.score import BASELINES, play
-
-
-def spikecam(*args: object) -> int:
-    return run([str(a) for a in args])
+from tests.commands import film_in, spikecam
 
 
 @pytest.fixture(autouse=True)
@@ -41,7 +35,7 @@ def test_without_a_display_the_oracle_is_filmed_and_the_path_printed(tmp_path: P
     assert "wrote Catch-v1.mp4: oracle at Catch-v1, 40 times slower than life" in printed
     assert "score 1.000" in printed
     cells = dict(zip(("seed", "steps", "time"), printed.splitlines()[-2].split(), strict=False))
-    film = [picture.copy() for picture in imageio.get_reader(tmp_path / "Catch-v1.mp4")]
+    film = film_in(tmp_path / "Catch-v1.mp4")
     assert len(film) == round(float(cells["time"]) * 40 * 25 / 1000) + 25
     assert film[0].shape[1] > 2 * 320 and not np.array_equal(film[0], film[9])
 
@@ -74,27 +68,6 @@ def test_an_agent_acts_on_what_it_was_trained_on_and_begins_each_episode(monkeyp
 
 
 @pytest.mark.parametrize(
-    ("args", "message"),
-    [
-        (("Track-v9",), "unknown id 'Track-v9'"),
-        (("Track-v1", "--policy", "keyboard"), "needs a window"),
-        (("Track-v1", "--policy", "oracl"), "unknown policy 'oracl'.*oracle"),
-        (("Track-v1", "--policy", "ReadDigit-v1"), "unknown policy 'ReadDigit-v1'"),
-        (("Track-v1", "--policy", "mine.pt"), "mine.pt"),
-        (("ReadSpin-v1", "--policy", "Catch-v1"), "takes 7 numbers an action, this agent gives 1: another task's"),
-        (("Track-v1", "--film", "a.avi"), "use .mp4"),
-        (("Track-v1", "--slow", "9000"), "at most 90000"),
-    ],
-)
-def test_what_is_wrong_is_said_in_a_line(args: tuple[str, ...], message: str, capsys, tmp_path: Path) -> None:
-    assert spikecam("play", *args) == 2
-    printed = capsys.readouterr().err.strip()
-    assert len(printed.splitlines()) == 1
-    assert re.search(message, printed), printed
-    assert not list(tmp_path.iterdir())
-
-
-@pytest.mark.parametrize(
     ("held", "action"),
     [
         ({"right"}, [1, 0, 0]),
@@ -113,7 +86,7 @@ def test_keys_that_are_held_make_an_action(held: set[str], action: list[float]) 
 
 
 def test_a_number_key_says_its_answer() -> None:
-    """In ReadSpin the second of four, in ReadDigit the digit itself: what the episode hears."""
+    """In ReadSpin the second of four, in ReadDigit the digit itself."""
     np.testing.assert_array_equal(action_of({"2", "a", "e"}, 2, 5, 4), [-1, 0, 1, 0, 1, 0, 0])
     np.testing.assert_array_equal(action_of({"0"}, 2, 11, 10), [0, 0, 1, 1, *[0] * 9])
     np.testing.assert_array_equal(action_of({"5", "q"}, 2, 5, 4), np.zeros(7))
@@ -132,7 +105,7 @@ def test_the_pace_is_25_pictures_a_second(step_s: float, slow: float) -> None:
 
 
 class Acted:
-    """A window whose user is a script: what happens with each picture."""
+    """A window whose user follows a script, by the number of the picture."""
 
     def __init__(self, script: dict[int, str], held: set[str]) -> None:
         self.script, self.held = script, held

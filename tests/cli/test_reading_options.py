@@ -1,4 +1,4 @@
-"""`spikecam denoise` and `spikecam campaign import` read what `read_recording` reads, with its options."""
+"""`spikecam denoise` and `spikecam campaign import` read all formats of `read_recording`, with its options."""
 
 from __future__ import annotations
 

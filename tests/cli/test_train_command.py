@@ -1,4 +1,4 @@
-"""`spikecam train`: every mode reaches what trains it, with the options that were given."""
+"""`spikecam train`: every mode reaches its training, with the options that were given."""
 
 from __future__ import annotations
 

@@ -1,8 +1,7 @@
-"""`spikecam view`: what is on the timeline, and where; none of it needs a display, little of it rerun."""
+"""`spikecam view`: entries of the timeline, and their frames; none of it needs a display, little of it rerun."""
 
 from __future__ import annotations
 
-import re
 import subprocess
 import sys
 from itertools import groupby
@@ -16,17 +15,13 @@ from denoiser import OnlineDnSS
 from scenes.catalogue import make_scene
 from spikecam_env.cli.live.streams import Block, Stream, of_recording, of_scene
 from spikecam_env.cli.live.timeline import DENOISED, NOISY, TARGET, TimelineEntry, entries
-from spikecam_env.cli.main import run
 from spikecam_env.cli.panels import display
 from spikecam_env.sensor import SpikeSensor
 from spikecam_env.streams import save_npz
+from tests.commands import spikecam
 
 SHAPE = (12, 20)
 SMALL = ("--size", 12, 20)
-
-
-def spikecam(*args: object) -> int:
-    return run([str(a) for a in args])
 
 
 def spikes(frames: int) -> np.ndarray:
@@ -92,7 +87,7 @@ def test_a_recording_and_a_scene_are_cut_into_blocks(tmp_path: Path) -> None:
 
 @pytest.fixture
 def sent(monkeypatch: pytest.MonkeyPatch) -> list[tuple[str, float, list[TimelineEntry]]]:
-    """What the command gives to rerun, which stays out of it."""
+    """Calls of rerun, which itself stays out."""
     given: list[tuple[str, float, list[TimelineEntry]]] = []
 
     def recorded(title: str, frame_rate_hz: float, found: Any) -> bytes:
@@ -128,29 +123,6 @@ def test_a_scene_is_viewed_as_its_recording_is(sent: list, tmp_path: Path) -> No
     scene, file = ([entry for entry in found if entry.path == NOISY] for *_, found in sent)
     for ours, theirs in zip(scene, file, strict=True):
         np.testing.assert_array_equal(ours.value, theirs.value)
-
-
-@pytest.mark.parametrize(
-    ("args", "message"),
-    [
-        (("disk", "--save", "a.mp4"), "use .rrd"),
-        (("disk", *SMALL, "--save", "a.rrd", "--pixels", "12,0"), "rows are 0 to 11, columns 0 to 19"),
-        (("disk", *SMALL, "--save", "a.rrd", "--pixels", "1"), "give row,column"),
-        (("disc", "--save", "a.rrd"), r"unknown scene, file or environment 'disc'.*\(disk\?\)"),
-        (("Track-v1", "--save", "a.rrd", "--policy", "oracl"), "'oracl'"),
-        (("none.dat", "--save", "a.rrd"), "none.dat"),
-        (("disk",), "write a file with --save FILE.rrd"),
-    ],
-)
-def test_what_is_wrong_is_said_in_a_line(
-    args: tuple[object, ...], message: str, capsys, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr("spikecam_env.cli.live.window.has_display", lambda: False)
-    monkeypatch.chdir(tmp_path)
-    assert spikecam("view", *args) == 2
-    printed = capsys.readouterr().err.strip()
-    assert len(printed.splitlines()) == 1 and re.search(message, printed), printed
-    assert not list(tmp_path.iterdir())
 
 
 def test_without_rerun_the_message_says_what_to_install(tmp_path: Path, capsys, monkeypatch) -> None:

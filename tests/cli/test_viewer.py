@@ -1,43 +1,30 @@
-"""When `spikecam demo` opens what it wrote."""
+"""When `spikecam demo` opens its result."""
 
 from __future__ import annotations
 
-import subprocess
 import sys
+import webbrowser
 from pathlib import Path
 
 import pytest
 
-from spikecam_env.cli import viewer
+from spikecam_env.cli.main import run
 
 
-@pytest.fixture
-def started(monkeypatch: pytest.MonkeyPatch) -> list[list[object]]:
-    """Programs that were started; as on a Linux desktop, in a terminal."""
-    programs: list[list[object]] = []
-    monkeypatch.setattr(sys, "platform", "linux")
-    monkeypatch.setattr(sys.stdout, "isatty", lambda: True)
-    monkeypatch.setattr(viewer.shutil, "which", lambda name: f"/usr/bin/{name}")
-    monkeypatch.setattr(subprocess, "Popen", lambda words, **_: programs.append(words))
-    for name, value in (("DISPLAY", ":0"), ("WAYLAND_DISPLAY", "")):
-        monkeypatch.setenv(name, value)
-    return programs
-
-
-def test_a_file_is_opened_in_a_terminal_of_a_desktop(started: list[list[object]]) -> None:
-    assert viewer.show_file(Path("demo.mp4"))
-    assert started == [["/usr/bin/xdg-open", Path("demo.mp4")]]
-
-
-def test_nothing_is_opened_where_nobody_would_see_it(
-    started: list[list[object]], monkeypatch: pytest.MonkeyPatch
+@pytest.mark.parametrize(
+    ("terminal", "display", "option", "opens"),
+    [(True, ":0", (), True), (False, ":0", (), False), (True, "", (), False), (True, ":0", ("--no-open",), False)],
+)
+def test_the_result_is_opened_in_a_terminal_of_a_desktop_alone(
+    terminal: bool, display: str, option: tuple[str, ...], opens: bool, tmp_path: Path, monkeypatch, capsys
 ) -> None:
-    with monkeypatch.context() as patch:
-        patch.setattr(sys.stdout, "isatty", lambda: False)
-        assert not viewer.show_file(Path("demo.mp4"))
-    with monkeypatch.context() as patch:
-        patch.setenv("DISPLAY", "")
-        assert not viewer.show_file(Path("demo.mp4"))
-    monkeypatch.setattr(viewer.shutil, "which", lambda name: None)
-    assert not viewer.show_file(Path("demo.mp4"))
-    assert not started
+    monkeypatch.setattr("spikecam_env.cli.demo.Demo._picture", lambda *_: ["wrote it"])
+    monkeypatch.setattr(sys, "platform", "linux")
+    monkeypatch.setattr(sys.stdout, "isatty", lambda: terminal)
+    monkeypatch.setenv("DISPLAY", display)
+    monkeypatch.setenv("WAYLAND_DISPLAY", "")
+    shown: list[str] = []
+    monkeypatch.setattr(webbrowser, "open", lambda address: bool(shown.append(address)) or True)
+    assert run(["demo", "--quick", "--out", str(tmp_path / "out"), *option]) == 0
+    assert shown == [(tmp_path / "out" / "demo.png").as_uri()] * opens
+    assert ("opened" in capsys.readouterr().out) == opens

@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from spikecam_env.cli.main import run
+from spikecam_env.cli.panels import write_film, write_picture
 
 SIZE = "--size 24 40"
 SMALL = {
@@ -47,18 +48,13 @@ ONLY_READ = {
 
 
 def _film(path: Path) -> None:
-    import imageio.v3 as imageio
-
-    pictures = np.random.default_rng(0).integers(0, 255, (9, 48, 80, 3), dtype=np.uint8)
-    imageio.imwrite(path, pictures, fps=30)
+    write_film(path, np.random.default_rng(0).integers(0, 255, (9, 48, 80, 3), dtype=np.uint8))
 
 
 def _pictures(folder: Path) -> None:
-    import imageio.v3 as imageio
-
     folder.mkdir()
     for i in range(4):
-        imageio.imwrite(folder / f"img{i}.png", np.full((24, 40), 40 * i, np.uint8))
+        write_picture(folder / f"img{i}.png", np.full((24, 40), 40 * i, np.uint8))
 
 
 def _times(table: Path) -> None:
@@ -83,9 +79,7 @@ def _campaign(folder: Path) -> None:
 
 
 def _picture(path: Path) -> None:
-    import imageio.v3 as imageio
-
-    imageio.imwrite(path, np.random.default_rng(0).integers(0, 255, (24, 40, 3), dtype=np.uint8))
+    write_picture(path, np.random.default_rng(0).integers(0, 255, (24, 40, 3), dtype=np.uint8))
 
 
 def _mesh(path: Path) -> None:

@@ -2,65 +2,42 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
 
-from tests.faults.writing import WRITINGS, said, tree
+from tests.commands import said
+from tests.faults.writing import WRITINGS, tree
 
 
-def in_the_way(folder: Path, name: str, is_file: bool) -> Path:
-    out = folder / name
-    out.mkdir() if is_file else out.touch()
-    return out
-
-
-def too_long(folder: Path, name: str, is_file: bool) -> Path:
-    return folder / f"{'x' * 300}{name}"
-
-
-def too_long_a_path(folder: Path, name: str, is_file: bool) -> Path:
-    return Path(*([str(folder)] + ["y" * 200] * 30)) / name
-
-
-def inside_a_file(folder: Path, name: str, is_file: bool) -> Path:
+def missing(folder: Path, name: str, is_file: bool) -> Path:
+    """A place in a folder that is not there; folders are made, so for these it is in a file."""
     (folder / "file").touch()
-    return folder / "file" / name
+    return folder / "no" / "such" / name if is_file else folder / "file" / name
 
 
-def missing_folder(folder: Path, name: str, is_file: bool) -> Path:
-    return folder / "no" / "such" / name if is_file else inside_a_file(folder, name, is_file)
+def linked(folder: Path, name: str, to: Path | str) -> Path:
+    (folder / name).symlink_to(to)
+    return folder / name
 
 
-def link_to_nowhere(folder: Path, name: str, is_file: bool) -> Path:
-    out = folder / name
-    out.symlink_to(folder / "no" / "such" / name if is_file else inside_a_file(folder, name, is_file))
-    return out
+def made(path: Path, is_file: bool) -> Path:
+    """A folder where a file is to be, or a file where a folder is."""
+    path.mkdir() if is_file else path.touch()
+    return path
 
 
-def links_in_a_loop(folder: Path, name: str, is_file: bool) -> Path:
-    out = folder / name
-    out.symlink_to(folder / "other")
-    (folder / "other").symlink_to(out)
-    return out
-
-
-def a_device(folder: Path, name: str, is_file: bool) -> Path:
-    out = folder / name
-    out.symlink_to("/dev/full")
-    return out
-
-
-PLACES = [
-    in_the_way,
-    too_long,
-    too_long_a_path,
-    inside_a_file,
-    missing_folder,
-    link_to_nowhere,
-    links_in_a_loop,
-    a_device,
-]
+PLACES: dict[str, Callable[[Path, str, bool], Path]] = {
+    "in the way": lambda folder, name, is_file: made(folder / name, is_file),
+    "too long": lambda folder, name, _: folder / f"{'x' * 300}{name}",
+    "too long a path": lambda folder, name, _: Path(*([str(folder)] + ["y" * 200] * 30)) / name,
+    "inside a file": lambda folder, name, _: missing(folder, name, False),
+    "missing folder": missing,
+    "link to nowhere": lambda folder, name, is_file: linked(folder, name, missing(folder, name, is_file)),
+    "links in a loop": lambda folder, name, _: linked(folder, name, linked(folder, "other", folder / name)),
+    "a device": lambda folder, name, _: linked(folder, name, "/dev/full"),
+}
 
 
 @pytest.mark.parametrize("command", WRITINGS)
@@ -69,16 +46,16 @@ def test_every_command_refuses_every_impossible_place_in_a_line(
 ) -> None:
     writing = WRITINGS[command]
     capsys.readouterr()
-    for place in PLACES:
-        folder = tmp_path / place.__name__
+    for name, place in PLACES.items():
+        folder = tmp_path / name
         folder.mkdir()
         out = place(folder, writing.out, writing.is_file)
         before = tree(folder)
         code = writing.refused(out, inputs, monkeypatch)
         lines = said(capsys.readouterr().err)
-        assert code == 2, (place.__name__, lines)
-        assert len(lines) == 1 and lines[0].startswith("spikecam: ") and len(lines[0]) < 1000, (place.__name__, lines)
-        assert tree(folder) == before, place.__name__
+        assert code == 2, (name, lines)
+        assert len(lines) == 1 and lines[0].startswith("spikecam: ") and len(lines[0]) < 1000, (name, lines)
+        assert tree(folder) == before, name
 
 
 @pytest.mark.parametrize("command", WRITINGS)

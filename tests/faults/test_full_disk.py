@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import resource
 import subprocess
 import sys
 from collections.abc import Callable
@@ -11,7 +10,8 @@ from types import SimpleNamespace
 
 import pytest
 
-from tests.faults.writing import WRITINGS, said, tree
+from tests.commands import said
+from tests.faults.writing import WRITINGS, files_up_to, tree
 
 PAGE = 4096
 """Bytes."""
@@ -67,12 +67,8 @@ def test_a_limit_on_the_size_of_files_ends_every_command_in_a_line(
 ) -> None:
     writing = WRITINGS[command]
     capsys.readouterr()
-    soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
-    resource.setrlimit(resource.RLIMIT_FSIZE, (100, hard))
-    try:
+    with files_up_to(100):
         code = writing.run(tmp_path / writing.out, inputs, monkeypatch)
-    finally:
-        resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
     lines = said(capsys.readouterr().err)
     assert code == 2, lines
     assert len(lines) == 1 and lines[0].startswith("spikecam: ") and "ulimit" in lines[0], lines

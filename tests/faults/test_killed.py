@@ -1,4 +1,4 @@
-"""What a killed process left half written is known, and goes when the next one writes into the folder."""
+"""Half-written files of a killed process are known, and go when the next one writes into the folder."""
 
 from __future__ import annotations
 

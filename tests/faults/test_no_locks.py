@@ -21,7 +21,8 @@ from spikecam_env.errors import InputError
 from spikecam_env.locks import VARIABLE, lock
 from spikecam_env.run_folder import alone_in
 from spikecam_env.streams import read_recording
-from tests.faults.writing import SMALL, WRITINGS, python, said, tree
+from tests.commands import said
+from tests.faults.writing import SMALL, WRITINGS, python, tree
 
 RUNS = [name for name, writing in WRITINGS.items() if writing.resumes]
 NUMBERS = [errno.ENOLCK, errno.EOPNOTSUPP, errno.ENOSYS, errno.EINVAL]

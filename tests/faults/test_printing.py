@@ -1,4 +1,4 @@
-"""What the command prints, where nobody takes it, and warnings."""
+"""Output of the command that nobody takes, and warnings."""
 
 from __future__ import annotations
 

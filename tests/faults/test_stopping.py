@@ -17,7 +17,8 @@ import pytest
 from spikecam_env.cli.main import run
 from spikecam_env.stopping import NAMES, is_command
 from spikecam_env.whole import PARTIAL
-from tests.faults.writing import SMALL, python, said, tree
+from tests.commands import said
+from tests.faults.writing import SMALL, python, tree
 
 SOON_S = 2.0
 """In which the command has stopped, at nine moments of ten: other work may hold a machine up."""
@@ -33,13 +34,13 @@ SIGNALS_CAUGHT = "SigCgt:"
 
 @dataclass(frozen=True)
 class Stop:
-    """A signal at a moment, and how the command took it.  at_s: after the handlers were there, or after the first file
-    was begun."""
+    """A signal at a moment, and how the command took it."""
 
     what: str
     signum: int
     writing: bool
     at_s: float
+    """Time [s] after the handlers were there, or after the first file was begun."""
     code: int | None
     took_s: float
     error: str
@@ -48,7 +49,7 @@ class Stop:
 
     @property
     def faults(self) -> list[str]:
-        """What was not as it should be, apart from how long it took."""
+        """Faults of the stop, apart from its duration."""
         lines = said(self.error)
         wrong = {
             f"code {self.code}": self.code != 128 + self.signum,
@@ -241,36 +242,33 @@ def test_a_signal_that_is_swallowed_or_meets_a_call_that_does_not_end_stops_the_
         assert not members(process.pid), how
     assert time.monotonic() - began < HARD_S / 2
     left = tree(tmp_path)
-    assert left <= {"a thread that goes on"}, left  # what it wrote was whole before
+    assert left <= {"a thread that goes on"}, left  # its file was whole before
 
 
-def test_a_second_signal_leaves_at_once(tmp_path: Path) -> None:
-    code = "import time\nfrom spikecam_env.stopping import watched\nwith watched():\n    print('ready', flush=True)\n"
-    code += "    try: time.sleep(9)\n    finally: time.sleep(9)"
+@pytest.mark.parametrize(
+    ("block", "signals"),
+    [
+        ("try: time.sleep(9)\n    finally: time.sleep(9)", (signal.SIGTERM, signal.SIGINT)),
+        ("import begins", (signal.SIGTERM,)),
+    ],
+    ids=["a second signal", "an import"],
+)
+def test_a_second_signal_and_one_within_an_import_leave_at_once(
+    block: str, signals: tuple[int, ...], tmp_path: Path
+) -> None:
+    """No exception may pass an import: C++ that begins itself in one, as torch's does, would end the process."""
+    (tmp_path / "begins.py").write_text("import os, time\ntry: time.sleep(9)\nexcept BaseException: os._exit(7)\n")
+    code = f"import sys, time\nsys.path.insert(0, {str(tmp_path)!r})\nfrom spikecam_env.stopping import watched\n"
+    code += f"with watched():\n    print('ready', flush=True)\n    {block}"
     process = subprocess.Popen(python(code), stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
     assert process.stdout and process.stdout.readline() == "ready\n"
+    time.sleep(0.2)  # the import has begun
     began = time.monotonic()
-    process.send_signal(signal.SIGTERM)
-    time.sleep(0.4)
-    process.send_signal(signal.SIGINT)
+    for i, number in enumerate(signals):
+        time.sleep(0.4 * i)
+        process.send_signal(number)
     _, error = process.communicate(timeout=HARD_S)
-    assert (process.returncode, error) == (143, "spikecam: stopped\n")
-    assert time.monotonic() - began < 0.9
-
-
-def test_no_exception_passes_an_import(tmp_path: Path) -> None:
-    """C++ that begins itself in one, as torch's does, ends the process where an exception comes to it."""
-    (tmp_path / "begins.py").write_text(
-        "import os, time\nprint('ready', flush=True)\ntry: time.sleep(9)\nexcept BaseException: os._exit(7)\n"
-    )
-    code = f"import sys\nsys.path.insert(0, {str(tmp_path)!r})\nfrom spikecam_env.stopping import watched\n"
-    code += "with watched():\n    import begins"
-    process = subprocess.Popen(python(code), stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
-    assert process.stdout and process.stdout.readline() == "ready\n"
-    began = time.monotonic()
-    process.send_signal(signal.SIGTERM)
-    _, error = process.communicate(timeout=HARD_S)
-    assert (process.returncode, error) == (143, "spikecam: stopped\n")
+    assert (process.returncode, error) == (128 + signals[0], "spikecam: stopped\n")
     assert time.monotonic() - began < 0.9
 
 

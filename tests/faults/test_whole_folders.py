@@ -3,9 +3,6 @@
 from __future__ import annotations
 
 import os
-import resource
-from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
 
 import numpy as np
@@ -15,22 +12,12 @@ from spikecam_env.cli.main import run
 from spikecam_env.errors import InputError, WriteError
 from spikecam_env.streams import save_vidar_dat
 from spikecam_env.whole import PARTIAL, whole_folder, write_text_whole
-from tests.faults.writing import WRITINGS, said, tree
+from tests.commands import said
+from tests.faults.writing import WRITINGS, files_up_to, tree
 
 RESULTS = [name for name, writing in WRITINGS.items() if not writing.is_file and not writing.resumes]
 NEW = ("export", "campaign import")
 """Commands that want a new folder."""
-
-
-@contextmanager
-def files_up_to(size: int) -> Iterator[None]:
-    """As `ulimit -f` does, in bytes."""
-    soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
-    resource.setrlimit(resource.RLIMIT_FSIZE, (size, hard))
-    try:
-        yield
-    finally:
-        resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
 
 
 def contents(folder: Path) -> dict[str, bytes]:

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import importlib
 import json
+import resource
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import cache, reduce
 from pathlib import Path
@@ -25,21 +27,20 @@ from spikecam_env.sensor import SensorModel
 
 SMALL = ("--size", "24", "40")
 Work = dict[str, Callable[..., object]]
-"""What stands in for work: `module:name` -> function."""
+"""Stand-ins for work: `module:name` -> function."""
 
 
 @dataclass(frozen=True)
 class Writing:
-    """A command line, in which {out}, {recording} and {campaign} are filled in.  out: name of what it writes.
-
-    work: stand-ins; `refused` lets none of it begin.  resumes: whether it has its folder to itself, and goes on there
-    with what was finished before it was stopped.
-    """
+    """A command line, in which {out}, {recording} and {campaign} are filled in."""
 
     args: str
     out: str
+    """Name of its file or folder."""
     work: Work
+    """Stand-ins; `refused` lets none of it begin."""
     resumes: bool = False
+    """Whether it has its folder to itself, and goes on there where it was stopped."""
 
     @property
     def is_file(self) -> bool:
@@ -201,15 +202,20 @@ def inputs_in(folder: Path) -> dict[str, Path]:
     return made
 
 
-def said(error: str) -> list[str]:
-    """The lines on standard error that are no progress bars."""
-    lines = [part for line in error.splitlines() for part in line.split("\r")]
-    return [line for line in lines if line.strip() and "%|" not in line and "it/s" not in line]
-
-
 def tree(folder: Path) -> set[str]:
     """Everything that is in a folder, hidden files too."""
     return {str(path.relative_to(folder)) for path in folder.rglob("*")}
+
+
+@contextmanager
+def files_up_to(size: int) -> Iterator[None]:
+    """As `ulimit -f` does, in bytes."""
+    soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (size, hard))
+    try:
+        yield
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
 
 
 def python(code: str) -> list[str]:

@@ -1,4 +1,4 @@
-"""Every case of malformed input goes through `meets`, which says what may come of it; counts are printed at the end."""
+"""Every case of malformed input goes through `meets`, which has the allowed outcomes; counts are printed at the end."""
 
 from __future__ import annotations
 
@@ -65,7 +65,7 @@ def listing(folder: Path) -> set[str]:
 
 @pytest.fixture(autouse=True)
 def counted(request) -> Iterator[None]:
-    """What a test counts goes to its report, so that it is known whichever process ran it."""
+    """Counts of a test go to its report, so that they are known whichever process ran it."""
     TALLY.clear()
     yield
     request.node.user_properties.append((MALFORMED, {target: dict(outcomes) for target, outcomes in TALLY.items()}))

@@ -59,12 +59,12 @@ TOML_LITERALS = {
 
 
 def json_files(good: Any, within: int = 99) -> Iterator[tuple[str, bytes]]:
-    """(what is wrong, the file) for a JSON document; of lists only the first `within` entries are changed."""
+    """(fault, the file) for a JSON document; of lists only the first `within` entries are changed."""
     return _documents(good, json.dumps, JSON_LITERALS, within)
 
 
 def toml_files(good: Any) -> Iterator[tuple[str, bytes]]:
-    """(what is wrong, the file) for a TOML document."""
+    """(fault, the file) for a TOML document."""
     return _documents(good, tomli_w.dumps, TOML_LITERALS, 99)
 
 
@@ -89,7 +89,7 @@ def _documents(
 
 
 def damaged(good: bytes, flips: int = 12) -> Iterator[tuple[str, bytes]]:
-    """(what is wrong, the file) for any file: cut, padded, flipped, of other bytes."""
+    """(fault, the file) for any file: cut, padded, flipped, of other bytes."""
     for share in (0.0, 0.25, 0.5, 0.75, 0.99):
         yield f"cut to {share:.0%}", good[: int(share * len(good))]
     yield "NUL bytes", bytes(len(good))
@@ -103,7 +103,7 @@ def damaged(good: bytes, flips: int = 12) -> Iterator[tuple[str, bytes]]:
 
 
 def npz_files(good: Mapping[str, Any]) -> Iterator[tuple[str, bytes]]:
-    """(what is wrong, the file) for an `.npz` of these arrays."""
+    """(fault, the file) for an `.npz` of these arrays."""
     whole = {name: np.asarray(array) for name, array in good.items()}
     for name, array in whole.items():
         others = {k: v for k, v in whole.items() if k != name}

@@ -22,7 +22,7 @@ def count(target: str, outcome: str) -> None:
 
 
 def reads_or_refuses(target: str, read: Callable[[], object]) -> bool:
-    """Whether it is read; what is not is refused by an InputError of one line; any other exception fails the test."""
+    """Whether it is read, or else refused by an InputError of one line; any other exception fails the test."""
     try:
         read()
     except InputError as error:
@@ -34,7 +34,7 @@ def reads_or_refuses(target: str, read: Callable[[], object]) -> bool:
 
 
 def each(cases: Iterable[tuple[str, T]], check: Callable[[T], object]) -> None:
-    """Checks every (what is wrong, case), whatever becomes of the others; names those that fail.
+    """Checks every (fault, case), whatever becomes of the others; names those that fail.
 
     A test of pytest to each would take longer than most cases do.
     """

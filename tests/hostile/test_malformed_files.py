@@ -112,7 +112,7 @@ def campaign(tmp_path_factory) -> Path:
 
 
 def changed(folder: Path, name: str, data: bytes, good: dict = CAMPAIGN) -> Path:
-    """The campaign with one file changed; it goes back to what it was with the next."""
+    """The campaign with one file changed; the next change undoes it."""
     (folder / "campaign.json").write_text(json.dumps(good))
     for file, arrays in (("flat-01.npz", LIGHT), ("flat-02.npz", BRIGHTER), ("rates.npz", RATES)):
         put(folder / file, npz(arrays))
@@ -121,7 +121,7 @@ def changed(folder: Path, name: str, data: bytes, good: dict = CAMPAIGN) -> Path
 
 
 def calibrated(target: str, folder: Path, out: Path, meets, through_command: bool = True) -> None:
-    """A campaign through its readers and, where they refuse it, through `calibrate`: what is good takes a second."""
+    """A campaign through its readers and, where they refuse it, through `calibrate`; a good one takes a second."""
     good = reads_or_refuses(target, lambda: [r.rate() if r.rates else r.load() for r in read_lit(folder)])
     if through_command and not good:
         assert meets(f"{target} (calibrate)", "calibrate", folder, "--out", out) == 2
@@ -204,7 +204,7 @@ CELLS = (
 
 
 def label_tables():
-    """(what is wrong, the table)."""
+    """(fault, the table)."""
     row = ",".join(ROW)
     for at, column in enumerate(TABLE.split(",")):
         for cell in CELLS:
@@ -276,7 +276,7 @@ def test_a_malformed_dat_is_refused(recordings: Path, tmp_path: Path, meets) -> 
 
 
 def h5_files():
-    """(what is wrong, the file) for a recording in HDF5."""
+    """(fault, the file) for a recording in HDF5."""
     packed = np.packbits(SPIKES.reshape(FRAMES, -1), axis=1, bitorder="little")
     attributes = {"format": "spikecam-recording/1", "height": 8, "width": 8, "frame_rate_hz": 40000.0, "seed": 0}
     odd = {
@@ -416,7 +416,7 @@ def test_what_is_no_file_is_refused(kind: str, target: str, args: tuple, tmp_pat
 
 
 def test_the_good_ones_are_good(campaign: Path, recordings: Path, tmp_path: Path, meets) -> None:
-    """What the mutations start from opens: otherwise every one of them would be refused for another reason."""
+    """Else every mutation of them would be refused for another reason."""
     folder = changed(campaign, "campaign.json", json.dumps(CAMPAIGN).encode())
     assert meets("good files", "calibrate", folder, "--out", tmp_path / "out") == 0
     for name, arrays in (("x.npz", STREAM), ("maps.npz", MAPS), ("light.npz", LIGHT), ("packed.npz", PACKED)):

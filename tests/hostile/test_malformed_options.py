@@ -23,12 +23,14 @@ EVERY_NUMBER_OF_WORKERS = (0, -1, 10**6, 2**64)
 EVERY_SIZE = ((0, 8), (8, -3), (10**9, 10**9), (2**63, 1), (1, 10**9))
 EVERY_FLOAT = ("nan", "inf", "-inf", "-1", "0", "1e400")
 """All that may be wrong: of `record`, `film` and `diagnose`."""
+ENDS = ("1e300", "1.7976931348623157e308", "1e-300", "5e-324", "-0.0", "-1e-300")
+"""Numbers at the ends of a float."""
 SEEDS = (-1, 2**63)
 COUNTS = (0, 10**16)
 WORKERS = (0, 10**6)
 SIZES = ((0, 8), (1, 10**9))
 FLOATS = ("nan", "inf", "0")
-"""What is nearest beyond either end, of every other command: options are checked in one place (`cli/options.py`)."""
+"""Values nearest beyond either end, of every other command: options are checked in one place (`cli/options.py`)."""
 SIZE_8 = ("--size", 8, 8)
 EFFECT_FILES = ("", "{here}", "{here}/none.py", "{here}/a.dat", "{here}/a.dat/x.py", "\x00.py", "/dev/null")
 
@@ -73,12 +75,12 @@ COMMAND_LINES: dict[str, tuple[tuple[Any, ...], dict[str, tuple[Any, ...]]]] = {
         {
             "--seed": EVERY_SEED,
             "--frames": (*EVERY_COUNT, 10**15),
-            "--seconds": (*EVERY_FLOAT, "1e9"),
+            "--seconds": (*EVERY_FLOAT, *ENDS, "1e9"),
             "--size": EVERY_SIZE,
-            "--film-rate": (*EVERY_FLOAT, "1e300", "1e-300"),
-            "--frame-rate": EVERY_FLOAT,
+            "--film-rate": (*EVERY_FLOAT, *ENDS),
+            "--frame-rate": (*EVERY_FLOAT, *ENDS),
             "--slow": (*EVERY_FLOAT, "2"),
-            "--mean-interval": (*EVERY_FLOAT, "0.5"),
+            "--mean-interval": (*EVERY_FLOAT, *ENDS, "0.5"),
             "--transfer": ("", "log", "gamma0", "gammanan", "gamma1e308"),
             "--truth-every": (-1, 10**16, 10**30),
             "--out": ("{here}/x", "{here}/x.avi", "{here}/none/x.h5"),
@@ -235,7 +237,7 @@ COMMAND_LINES: dict[str, tuple[tuple[Any, ...], dict[str, tuple[Any, ...]]]] = {
             "--film": ("{here}/x.avi", "{here}/x", "{here}/none/x.mp4"),
             "--frames": (*COUNTS, 31),
             "--seconds": FLOATS,
-            "--speed": FLOATS,
+            "--speed": (*FLOATS, *ENDS),
             "--pictures": (*FLOATS, "1e4"),
             "--passes": COUNTS,
             "--weights": ("{here}/none.pt", "{here}/a.dat", "\x00"),
@@ -404,7 +406,7 @@ COMMAND_LINES: dict[str, tuple[tuple[Any, ...], dict[str, tuple[Any, ...]]]] = {
 
 @pytest.mark.parametrize("name", COMMAND_LINES)
 def test_an_option_out_of_range_is_refused_by_name(name: str, tmp_path: Path, meets) -> None:
-    """Of a command every option in turn, with every value of the table; what is not refused is named."""
+    """Of a command every option in turn, with every value of the table; values that are not refused are named."""
     (tmp_path / "a.dat").write_bytes(bytes(range(256)) * 2)
     np.save(tmp_path / "film.npy", np.full((5, 8, 8), 100, np.uint8))
     places = {"here": tmp_path, "out": tmp_path / "out"}
@@ -416,7 +418,7 @@ def test_an_option_out_of_range_is_refused_by_name(name: str, tmp_path: Path, me
 
 
 def lines_with(line: tuple[Any, ...], options: dict[str, tuple[Any, ...]]) -> Iterator[tuple[str, list[Any]]]:
-    """(what is wrong, the words) for a good command line and values of its options."""
+    """(fault, the words) for a good command line and values of its options."""
     for option, values in options.items():
         for value in values:
             words = value if isinstance(value, tuple) else (value,)

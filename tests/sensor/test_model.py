@@ -66,7 +66,7 @@ def test_what_is_wrong_is_named_with_what_is_allowed(tmp_path) -> None:
         (text.replace("spikecam-model/1", "other/1"), "expected 'spikecam-model/1'"),
         (text.replace('"dark_current"', '"dark_curent"'), "unknown effect 'dark_curent'"),
         (text.replace("mean_pA", "mean_nA"), "mean_nA"),
-        (text.replace("mean_pA = 0.4442", "mean_pA = -1.0"), "dark_current.mean_pA = -1.0 is outside"),
+        (text.replace("mean_pA = 0.4442", "mean_pA = -1.0"), "dark_current.mean_pA = -1.0; it must be"),
         (text.replace("frame_rate_hz = 40000.0", "frame_rate_hz = -1.0"), "frame_rate_hz"),
         (text.replace("temperature_K = 300.0", 'temperature_K = "warm"'), "temperature_K"),
     ]:

@@ -231,7 +231,7 @@ def test_ctrl_c_within_a_hook_is_ctrl_c(tmp_path: Path) -> None:
 def test_parameters_are_held_to_their_ranges_where_an_effect_makes_itself(tmp_path: Path) -> None:
     hooks = "    def __post_init__(self):\n        if self.loss == 0.5:\n            raise KeyError('half')\n" + GOOD
     with effects_from(own_file(tmp_path / "grey_filter.py", hooks)) as [grey]:
-        with pytest.raises(InputError, match="loss = nan is outside"):
+        with pytest.raises(InputError, match="loss = nan; it must be"):
             grey(loss=np.nan)
         with pytest.raises(OwnCodeError, match="effect grey_filter, __post_init__: KeyError: 'half'"):
             grey(loss=0.5)

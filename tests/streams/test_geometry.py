@@ -1,4 +1,4 @@
-"""What spikes say of the geometry that a headerless file was read with: never an alarm on a right reading."""
+"""Spikes show whether the geometry of a headerless file is right: never an alarm on a right reading."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What HDF5 writes to never fails, and reads back what was written, kept on disk or not."""
+"""The file that HDF5 writes to never fails, and reads back all writes, kept on disk or not."""
 
 from __future__ import annotations
 

@@ -1,1 +1,1 @@
-"""What `spikecam play` and `spikecam view` show: episodes, pictures and figures, on a screen, in a film, in rerun."""
+"""Episodes, pictures and figures of `spikecam play`, `live` and `view`: on a screen, in a film, in rerun."""

@@ -1,4 +1,4 @@
-"""An episode step by step, with what there is to show of each step; and how steps become pictures of a film."""
+"""An episode step by step, and how steps become pictures of a film."""
 
 from __future__ import annotations
 
@@ -23,34 +23,36 @@ FPS = 25
 
 @dataclass(frozen=True)
 class Moment:
-    """After a step.
-
-    seed, step   of the episode; step 0 is that of reset
-    frame        of the camera, by which this is
-    time_s       the same in seconds of the scene
-    spikes       (K, H, W) uint8, of the step
-    reward       of the step; total: of the episode so far
-    info         as of `AimingEnv`
-    over         whether the episode ended with it
-    """
+    """An episode after a step, of which 0 is the reset."""
 
     seed: int
     step: int
     frame: int
+    """Of the camera, at the end of the step."""
     time_s: float
+    """The same in seconds of the scene."""
     spikes: NDArray[np.uint8]
+    """(K, H, W), of the step."""
     reward: float
+    """Of the step."""
     total: float
+    """Reward of the episode so far."""
     info: dict[str, Any]
+    """As of `AimingEnv`."""
     over: bool
+    """Whether the episode ended with the step."""
 
 
 def environment(name: str, player: Player, **options: Any) -> gymnasium.Env[Any, Any]:
-    """Of an id, with or without `spikecam_env/`, as the player sees it.
+    """The environment of an id, with or without `spikecam_env/`, as the player sees it.
 
-    Raises InputError for an unknown id, and for an agent of a task with other actions.
+    Args:
+        name: the id.
+        player: who acts.
+        options: of the environment; `split` goes to tasks of version 1 alone.
 
-    options: of the environment; `split` goes to tasks of version 1, the others have none.
+    Raises:
+        InputError: an unknown id, or an agent of a task with other actions.
     """
     full, known = full_name(name), {**ENVIRONMENTS, **TASK_ENVIRONMENTS}
     if full not in known:

@@ -1,4 +1,4 @@
-"""Episodes as a film, and as what a window shows: the same pictures, at the same pace."""
+"""Episodes as a film, or in a window: the same pictures, at the same pace."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ IDLE_S = 0.04
 
 
 class Shows(Protocol):
-    """What is asked of a window; `live.window.Window` is one."""
+    """A window; `live.window.DisplayWindow` is one."""
 
     closed: bool
 
@@ -57,9 +57,10 @@ def watch(
     slow: float,
     opened: Callable[[Frame], Shows],
 ) -> list[Moment]:
-    """Episodes in a window, until they are over or its user ends it; the last moment of each that came to its end.
+    """Show episodes in a window; space pauses, n goes to the next episode, escape ends.
 
-    opened: makes the window, with its first picture.  Space pauses, n goes to the next episode, escape ends.
+    Returns:
+        The last moment of each episode that came to its end.
     """
     ended: list[Moment] = []
     window: Shows | None = None
@@ -91,7 +92,7 @@ def _paced(
 
 
 def _keys(window: Shows | None) -> list[str]:
-    """What was pressed; after a space, once another has come.  A window that was closed is an escape."""
+    """Keys that were pressed; after a space, once another has come.  A window that was closed is an escape."""
     if window is None:
         return []
     keys = window.taken()

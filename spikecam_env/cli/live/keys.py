@@ -1,4 +1,4 @@
-"""Keys that steer: what is held down becomes an action.
+"""Keys that steer: those held down become an action.
 
 left a, right d      pan by the top rate
 up w, down s         tilt by it
@@ -63,8 +63,9 @@ def action_of(held: Iterable[str], axes: int, further: int, answers: int = 0) ->
 def answer_of(key: str, answers: int) -> int | None:
     """Number of the answer that a key gives: of ten the digit itself, else 1 is the first.
 
-    >>> answer_of("1", 4), answer_of("5", 4), answer_of("1", 10)
-    (0, None, 1)
+    Example:
+        >>> answer_of("1", 4), answer_of("5", 4), answer_of("1", 10)
+        (0, None, 1)
     """
     if key not in ANSWERS:
         return None

@@ -1,4 +1,4 @@
-"""What `spikecam live` shows: the noisy and the denoised picture side by side, and the figures below.
+"""The screen of `spikecam live`: the noisy and the denoised picture side by side, and the figures below.
 
 Thirty of these a second are made beside the network, so grey values come from a table and captions are drawn once.
 """

@@ -17,21 +17,17 @@ from spikecam_env.errors import unknown_name
 
 @dataclass(frozen=True)
 class Player:
-    """act: see `envs.score.Policy`; sees: keywords of the environment it needs.
-
-    actions: numbers of its action, None where it suits every environment.
-    """
+    """Who acts in an environment."""
 
     act: Policy
     sees: tuple[tuple[str, Any], ...] = (("obs", "tfp"),)
+    """Keywords of the environment that it needs."""
     actions: int | None = None
+    """Numbers of its action; None where it suits every environment."""
 
 
 def player(name: str) -> Player:
-    """A baseline by name, or an agent, whose code, torch's too, is imported with it.
-
-    Raises InputError for an unknown name, an unusable file, and a task's agent that does not come with the package.
-    """
+    """A baseline or an agent, by its name or its file."""
     if name in BASELINES:
         return Player(BASELINES[name])
     from spikecam_env.agents.agent import Agent, is_file, shipped

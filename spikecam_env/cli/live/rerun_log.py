@@ -54,7 +54,7 @@ def _recording(title: str) -> Any:
 
 
 def _send(recording: Any, frame_rate_hz: float, entries: Iterable[TimelineEntry]) -> None:
-    """Log each entry, on the timelines `time` [s] and `frame`; what is new gets its name, and its place on the page."""
+    """Log each entry, on the timelines `time` [s] and `frame`; a new one gets its name, and its place on the page."""
     package, known = rerun(), set[str]()
     pictures: list[str] = []
     plots: dict[str, int] = {}
@@ -87,10 +87,7 @@ def _path(entry: TimelineEntry) -> list[str]:
 
 
 def _layout(pictures: Sequence[str], plots: Mapping[str, int]) -> Any:
-    """Pictures on the left, plots on the right, with a legend where there is more than one line; time in seconds.
-
-    pictures: their paths.  plots: room -> number of lines.
-    """
+    """Pictures on the left, by their paths; plots on the right, a legend where a room has several lines."""
     part, package = import_module("rerun.blueprint"), rerun()
     left = [part.Spatial2DView(origin=f"/{path}", name=path.rpartition("/")[2]) for path in pictures]
     right = [

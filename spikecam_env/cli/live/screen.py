@@ -1,4 +1,4 @@
-"""A moment as a picture: what the camera sees with the middle marked, and the figures beside it."""
+"""A moment as a picture: the camera's picture with its middle marked, and the figures beside it."""
 
 from __future__ import annotations
 
@@ -22,12 +22,7 @@ BRIGHT_PERCENT = 99.5
 
 
 class Screen:
-    """Makes the pictures of one episode after another; all have one size.
-
-    denoise      also show the denoised picture
-    show_target  mark where the target is
-    task, who, keys   said on it
-    """
+    """Makes the pictures of one episode after another; all have one size."""
 
     def __init__(
         self, task: str, who: str, *, denoise: bool = False, show_target: bool = False, keys: str = ""
@@ -66,7 +61,7 @@ class Screen:
 
 
 def figures(moment: Moment) -> list[tuple[str, str]]:
-    """(name, value) of what is said beside the picture."""
+    """(name, value) of the lines beside the picture."""
     info = moment.info
     return [
         ("time", f"{1e3 * moment.time_s:.2f} ms"),

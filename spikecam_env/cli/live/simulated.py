@@ -20,8 +20,10 @@ if TYPE_CHECKING:
 
 @dataclass
 class SimulatedSource:
-    """A `streams.sources.Source`: frames are simulated as they are read, at `speed` times the camera's frame rate at
-    most.  One that is slower is late, and loses nothing."""
+    """A `streams.sources.Source` that simulates frames as they are read, at most `speed` times as fast as the camera.
+
+    A slower simulation is late, and loses nothing.
+    """
 
     title: str
     scene: Scene

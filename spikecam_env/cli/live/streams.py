@@ -1,4 +1,4 @@
-"""What `spikecam view` looks at, block by block: a recording, a scene through a sensor, an episode."""
+"""Streams of `spikecam view`, block by block: a recording, a scene through a sensor, an episode."""
 
 from __future__ import annotations
 

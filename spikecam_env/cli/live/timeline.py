@@ -1,10 +1,10 @@
 """A stream as entries on a timeline: pictures, rates of pixels, figures, statistics; each at its own frame.
 
-noisy picture       share of the block's frames with a spike (TFP), at the block's middle frame
-denoised picture    the plane of that frame, which the online denoiser finishes 17 to 32 frames later
-rate of a pixel     both, there                                              [spikes/frame]
-spikes a frame      mean over the block's frames and all pixels              [spikes/frame]
-mean interval       its inverse                                              [frames]
+- noisy picture: share of the block's frames with a spike (TFP), at the block's middle frame;
+- denoised picture: the plane of that frame, which the online denoiser finishes 17 to 32 frames later;
+- rate of a pixel [spikes/frame]: both pictures at that pixel;
+- spikes a frame: mean over the block's frames and all pixels;
+- mean interval [frames]: its inverse.
 """
 
 from __future__ import annotations

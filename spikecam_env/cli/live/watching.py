@@ -44,10 +44,7 @@ class Watching:
             self._next(STATUS_S)
 
     def as_a_film(self, film: Path) -> None:
-        """What a window would show, PICTURES_S pictures a second, whether there is another one or not.
-
-        Raises InputError where there is none at all.
-        """
+        """Write a film of PICTURES_S pictures a second; one that is late is the one before, again."""
         while not self._session.over and self._shown is None:
             self._next(IDLE_S)
         picture = self._picture()
@@ -75,8 +72,7 @@ class Watching:
                 window.wait(IDLE_S)
 
     def summary(self) -> dict[str, Any]:
-        """What came and what was shown, as a row; warns where the stream was cut, raises InputError where there was no
-        picture."""
+        """Counts and latencies as a row; warns where the stream was cut, raises InputError where it had no picture."""
         self._write("")
         if self._source.cut:
             warnings.warn(self._source.cut, UserWarning, stacklevel=2)

@@ -43,7 +43,7 @@ class DisplayWindow:
         self._figure.show()
 
     def show(self, picture: NDArray[np.uint8], seconds: float) -> None:
-        """Show a picture for so long; what the last one came late is taken off."""
+        """Show a picture for so long, less the delay of the last one."""
         if self.closed:
             return
         self._image.set_data(picture)

@@ -150,7 +150,7 @@ def test_is_documented(name: str) -> None:
 
 @pytest.mark.parametrize("name, parameter", [("afterpulsing", "delay_frames"), ("threshold_flicker_noise", "octaves")])
 def test_whole_numbers_are_asked_for(name: str, parameter: str) -> None:
-    with pytest.raises(InputError, match=f"{name}.{parameter} = 2.5 must be a whole number"):
+    with pytest.raises(InputError, match=f"{name}.{parameter} = 2.5; it must be a whole number"):
         CATALOGUE[name](**{parameter: 2.5})
 
 
