@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from importlib import import_module
 from inspect import signature
 from typing import Any, Protocol
 
@@ -45,7 +44,9 @@ def policy_of(policy: Any) -> tuple[Policy, dict[str, Any]]:
     if isinstance(policy, str):
         if policy in BASELINES:
             return BASELINES[policy], {}
-        policy = import_module("spikecam_env.agents.agent").Agent.load(policy)
+        from spikecam_env.agents.agent import Agent  # torch takes seconds
+
+        policy = Agent.load(policy)
     if isinstance(policy, type):
         raise InputError(f"policy is the class {policy.__name__}; give an instance of it")
     if hasattr(policy, "begin") and hasattr(policy, "act"):

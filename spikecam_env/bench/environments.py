@@ -186,7 +186,7 @@ def shares(one: Contestant, seconds: float, rounds: int) -> dict[str, float]:
 
     def expose() -> None:
         for env in one.envs:  # the block of the last step once more
-            env.sensor.frame = env.asked[0]
+            env.sensor.frame = env.next_block[0]
         step_together([env.sensor for env in one.envs], light, OPTIONS["frames_per_step"], threads=threads)
 
     found = []

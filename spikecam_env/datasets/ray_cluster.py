@@ -14,7 +14,7 @@ from pathlib import Path
 from types import ModuleType
 
 from spikecam_env.datasets.plan import Plan, PlannedScene
-from spikecam_env.datasets.worker import use_one_thread
+from spikecam_env.datasets.processes import use_one_thread
 from spikecam_env.datasets.write import Written, write_scene
 from spikecam_env.errors import InputError
 

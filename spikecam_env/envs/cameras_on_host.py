@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from spikecam_env.envs.observations import Blocks
-from spikecam_env.envs.spike_camera import Each, SpikeCameraEnv, expose
+from spikecam_env.envs.spike_camera import ForEach, SpikeCameraEnv, expose
 
 
 class HostCameras:
@@ -25,7 +25,7 @@ class HostCameras:
     def __init__(self, envs: Sequence[SpikeCameraEnv], threads: int) -> None:
         self._envs, self._threads = envs, threads
 
-    def exposed(self, each: Each, numbers: Sequence[int]) -> Blocks:
+    def exposed(self, each: ForEach, numbers: Sequence[int]) -> Blocks:
         """The next block of some cameras, along the paths that they follow, in memory of its own.
 
         Args:
@@ -45,7 +45,7 @@ class HostCameras:
         return values
 
 
-def by_place(each: Each, numbers: Sequence[int]) -> Each:
+def by_place(each: ForEach, numbers: Sequence[int]) -> ForEach:
     """Work of places in a list of environments, on the threads of those.
 
     Args:

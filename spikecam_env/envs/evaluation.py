@@ -1,12 +1,12 @@
-"""What a policy reached on test episodes, and how sure that is.
+"""The score of a policy on test episodes, and its interval.
 
     score = (performance - nothing's) / (oracle's - nothing's)
 
 The interval covers the score of all episodes of the split in 95 of 100 evaluations.
 
 - If every performance is 0 or 1 (Catch, Saccade), it is Wilson's interval of their mean, scaled as the score is.
-- Otherwise it is a paired bootstrap: episodes are drawn with replacement, each with what the policy, nothing and the
-  oracle reached on it, and the score is computed anew.
+- Otherwise it is a paired bootstrap.  Episodes are drawn with replacement, each with the performances of the policy, of
+  nothing and of the oracle, and the score is computed anew.
 
 Sources: Wilson, JASA 22 (1927); Efron and Tibshirani, "An Introduction to the Bootstrap" (1993), chapter 13.
 """
@@ -78,15 +78,12 @@ class Evaluation:
         """The evaluation of episodes.
 
         Args:
-            task: Id of the task.
-            performances: The policy's performance in each episode.
-            nothing: That of doing nothing, in the same episodes.
-            oracle: The oracle's, in the same episodes.
-            success: Share of episodes that end in success.
-            returns: Mean sum of rewards.
-
-        Returns:
-            The score with its interval.
+            task: id of the task.
+            performances: of the policy, in each episode.
+            nothing: of doing nothing, in the same episodes.
+            oracle: of the oracle, in the same episodes.
+            success: share of episodes that end in success.
+            returns: mean sum of rewards.
         """
         reached, still, best = (np.asarray(each, float) for each in (performances, nothing, oracle))
         mean, low_end, high_end = float(reached.mean()), float(still.mean()), float(best.mean())

@@ -26,14 +26,11 @@ def checked_options(options: Any, rules: Mapping[str, Rule]) -> dict[str, Any]:
     """Options by name, each checked by its rule.
 
     Args:
-        options: A dictionary, or None for no options.
-        rules: The options that this environment knows.
-
-    Returns:
-        The checked values of those that were given.
+        options: a dictionary, or None for no options.
+        rules: of the options that this environment knows.
 
     Raises:
-        InputError: For an unknown name, an unusable value, and for options that are no dictionary.
+        InputError: for an unknown name, an unusable value, and for options that are no dictionary.
 
     Example:
         >>> checked_options({"offset": [1, 2]}, {"offset": pair})

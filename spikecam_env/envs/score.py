@@ -48,24 +48,22 @@ BASELINES: dict[str, Policy] = {"oracle": act_oracle, "nothing": act_nothing, "r
 
 @dataclass(frozen=True)
 class Played:
-    """Means over episodes, and the performance in each.
-
-    returns      undiscounted sum of rewards
-    performance  `info["performance"]` at the end, 0 to 1
-    success      share of episodes with `info["is_success"]` at the end
-    distance_px  over all steps
-    ms_a_step    of the environment alone [ms]
-    steps        an episode
-    performances in each episode
-    """
+    """Means over episodes, and the performance in each."""
 
     returns: float
+    """Undiscounted sum of rewards."""
     performance: float
+    """`info["performance"]` at the end, 0 to 1."""
     success: float
+    """Share of episodes with `info["is_success"]` at the end."""
     distance_px: float
+    """Distance from the target over all steps [pixels]."""
     ms_a_step: float
+    """Time of a step in the environment alone [ms]."""
     steps: float
+    """Steps of an episode."""
     performances: tuple[float, ...]
+    """Performance in each episode."""
 
 
 def play(env: gymnasium.Env[Any, Any], policy: Policy, seeds: Iterable[int], progress: bool | None = False) -> Played:
@@ -126,8 +124,8 @@ def ends(env: gymnasium.Env[Any, Any], seeds: Sequence[int]) -> tuple[list[float
     inner = _aiming(env)
     still = np.zeros(inner.action_space.shape or (), np.float32)
     most = None if env.spec is None else env.spec.max_episode_steps
-    begun = [inner.opening(seed) for seed in seeds]
-    nothing, best = ([_end(course, act, most) for course in begun] for act in (lambda _: still, oracle))
+    first = [inner.opening(seed) for seed in seeds]
+    nothing, best = ([_end(course, act, most) for course in first] for act in (lambda _: still, oracle))
     return nothing, best
 
 
@@ -159,9 +157,16 @@ def baselines(
 ) -> list[dict[str, Any]]:
     """The baselines of every id, on the episodes of seeds `seed`, `seed` + 1, ...; test episodes where an id has them.
 
-    options  keywords of every environment, e.g. shape
-    A row an id: task, the oracle's performance, return and success, nothing's performance, return and success, the
-    score of random actions, mean distances of the oracle and of nothing [pixels], milliseconds a step.
+    Args:
+        ids: of the environments.
+        episodes: of each id.
+        seed: of the first episode.
+        progress: whether a bar is shown.
+        options: keywords of every environment, e.g. shape.
+
+    Returns:
+        A row an id: task, performance, return and success of the oracle and of doing nothing, the score of random
+        actions, mean distances of the oracle and of nothing [pixels], milliseconds a step.
     """
     return [_row(name, range(seed, seed + episodes), options) for name in tqdm(ids, unit="task", disable=not progress)]
 

@@ -1,6 +1,7 @@
-"""What these environments reward: a place that comes nearer to the middle of the view.
+"""Rewards of these environments: a place comes nearer to the middle of the view.
 
     closeness = 1 - distance from the middle of the picture / half the picture's diagonal
+
     reward "distance" = closeness at the end of the step
     reward "progress" = PROGRESS (closeness at the end - closeness at the beginning)
 

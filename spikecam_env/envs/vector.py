@@ -13,7 +13,7 @@ from contextlib import suppress
 from copy import deepcopy
 from dataclasses import replace
 from difflib import get_close_matches
-from importlib import import_module
+from functools import partial
 from inspect import Parameter, signature
 from typing import Any, TypeVar
 
@@ -56,11 +56,9 @@ class SpikeCameraVectorEnv(VectorEnv[Any, Any, Any]):
     `autoreset_mode` says when the next episode begins where one is over.  In every mode the bits are those of
     gymnasium's `SyncVectorEnv`.
 
-    | mode | the next episode begins |
-    |---|---|
-    | NEXT_STEP | with the next step, whose action is not used and whose reward is 0 |
-    | SAME_STEP | at once; `info` has `final_obs` and `final_info` of the episode that is over |
-    | DISABLED | with `reset(options={"reset_mask": over})`, before which a step is refused |
+    - NEXT_STEP: with the next step, whose action is not used and whose reward is 0.
+    - SAME_STEP: at once; `info` has `final_obs` and `final_info` of the episode that is over.
+    - DISABLED: with `reset(options={"reset_mask": over})`, before which a step is refused.
 
     `envs` are the single environments, to look at; they expose the block, and the observation is made of the blocks
     of all at once.  A vector environment can be pickled and copied.
@@ -274,11 +272,12 @@ class SpikeCameraVectorEnv(VectorEnv[Any, Any, Any]):
 
     def _on(self, device: Any) -> Any:
         """The cameras on a torch device."""
-        module = import_module("spikecam_env.envs.cameras_on_device")
-        module.check_on_device(self.observation, self.render_mode)
+        from spikecam_env.envs.cameras_on_device import DeviceCameras, check_on_device  # torch takes seconds
+
+        check_on_device(self.observation, self.render_mode)
         if self.autoreset_mode is AutoresetMode.SAME_STEP and not self.observation.begins_alone:
             raise InputError(f"autoreset_mode is SameStep and obs {_law(self)}; on a device take NextStep, or 'tfp'")
-        cameras = module.DeviceCameras(self.envs, device)
+        cameras = DeviceCameras(self.envs, device)
         self._view = replace(self._view, device=cameras.device)
         return cameras
 
@@ -301,8 +300,7 @@ class SpikeCameraVectorEnv(VectorEnv[Any, Any, Any]):
         )
 
     def _first_blocks(self, which: NDArray[np.bool_]) -> tuple[Any, Any, list[dict[str, Any]]]:
-        """The blocks with which episodes begin: what is observed of those streams, their state, and infos, empty where
-        none begins."""
+        """Observations, their state, and infos of the episodes that begin; infos are empty where none does."""
         numbers = np.flatnonzero(which).tolist()
         self._over[which], self._steps[which] = False, 0
         blocks = self._cameras.exposed(self.each, numbers)
@@ -326,7 +324,7 @@ class SpikeCameraVectorEnv(VectorEnv[Any, Any, Any]):
         return with_rows(seen, rows, over), [a if b else c for a, b, c in zip(first, over, infos, strict=True)]
 
     def _observed(self, picture: Any, state: Any, infos: Sequence[dict[str, Any]]) -> Any:
-        """What agents see of some streams; the age of the picture goes into infos."""
+        """The observation of some streams; the age of the picture goes into infos."""
         age = np.broadcast_to(self.observation.age(state), (len(infos),)).astype(np.float64)
         for info, its in zip(infos, age.tolist(), strict=True):
             info["age"] = its
@@ -403,3 +401,23 @@ def _check_phases(env: Any) -> None:
                 f"{kind.__name__} has a {name} of its own, which a vector environment would not call; override "
                 f"{parts} instead"
             )
+
+
+def whose_keyword(name: str) -> str:
+    """A hint for a keyword of vector environments alone; nothing for others."""
+    single, vector = (set(signature(kind.__init__).parameters) for kind in (SpikeCameraEnv, SpikeCameraVectorEnv))
+    if name not in vector - single - {"single", "options"}:
+        return ""
+    return 'it is of vector environments: gymnasium.make_vec(id, vectorization_mode="vector_entry_point", ...)'
+
+
+def __getattr__(name: str) -> Any:
+    """Entry points of vector environments: `spikecam_env.envs.vector:MODULE.CLASS` is the vector of `MODULE:CLASS`.
+
+    gymnasium looks a vector environment up as an attribute of a module, by text, so that specifications can be written
+    to files; every class of environments thus has one, and none has to be declared.
+    """
+    module, dot, single = name.rpartition(".")
+    if not dot:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    return partial(SpikeCameraVectorEnv, f"{module}:{single}")

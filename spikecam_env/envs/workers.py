@@ -57,7 +57,7 @@ class Workers:
         Raises:
             NotReadyError: in a fork of the process that made them.
         """
-        futures = self._begun(work, numbers)
+        futures = self._submitted(work, numbers)
         wait(futures.values())
         done = {n: iter(future.result()) for n, future in futures.items()}
         return [next(done[n % len(self)]) for n in numbers]
@@ -74,15 +74,15 @@ class Workers:
         """
         if self._process != os.getpid():
             return
-        futures = self._begun(last, numbers) if last is not None else {}
+        futures = self._submitted(last, numbers) if last is not None else {}
         _POOLS.difference_update(self._pools)
         for pool in self._pools:
             pool.shutdown(wait=waits)
         for future in futures.values() if waits else ():
             future.result()
 
-    def _begun(self, work: Callable[[int], T], numbers: Sequence[int]) -> dict[int, Future[list[T]]]:
-        """By thread."""
+    def _submitted(self, work: Callable[[int], T], numbers: Sequence[int]) -> dict[int, Future[list[T]]]:
+        """Futures by the number of the thread."""
         if self._process != os.getpid():  # whose threads a fork does not have: work given to them is never done
             raise NotReadyError("the environments belong to the process that made them; make others in this one")
         shares: dict[int, list[int]] = {}

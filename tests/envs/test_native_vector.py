@@ -84,7 +84,7 @@ def test_every_id_has_a_vector() -> None:
     """Of the class of its single environment; what the kinds show of it holds for all that are made with that class."""
     for name in (*ENVIRONMENTS, *TASK_ENVIRONMENTS):
         spec = gymnasium.spec(name)
-        assert spec.vector_entry_point == f"spikecam_env.envs.vector_of:{str(spec.entry_point).replace(':', '.')}"
+        assert spec.vector_entry_point == f"spikecam_env.envs.vector:{str(spec.entry_point).replace(':', '.')}"
     classes = {gymnasium.spec(name).entry_point for name in ENVIRONMENTS}
     assert classes == {gymnasium.spec(name).entry_point for name in KINDS}
 
