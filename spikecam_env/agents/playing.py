@@ -1,4 +1,4 @@
-"""What acts, as `envs.score` plays it, and the score that it reaches."""
+"""Policies of every form, as `envs.score` plays them, and the score of one."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ class Actor(Protocol):
     """`Agent` or `Tracker`."""
 
     def begin(self) -> None:
-        """Forget what was seen: an episode begins."""
+        """Forget all observations: an episode begins."""
 
     def act(self, observation: Any) -> NDArray[np.float32]:
         """The action."""
@@ -33,13 +33,13 @@ def policy_of(policy: Any) -> tuple[Policy, dict[str, Any]]:
     """Anything that acts, as `envs.score.play` takes it.
 
     Args:
-        policy: As of `agents.evaluate`.
+        policy: as of `agents.evaluate`.
 
     Returns:
         The policy, and the keywords of the environment that it needs.
 
     Raises:
-        InputError: For anything that cannot act.
+        InputError: for anything that cannot act.
     """
     if isinstance(policy, str):
         if policy in BASELINES:
@@ -81,8 +81,8 @@ def _predicting(model: Any) -> Policy:
         begins = env.standing.step == 0
         memory[0] = None if begins else memory[0]
         given = {"state": memory[0], "episode_start": np.array([begins]), "deterministic": True}
-        found = model.predict(observation, **{name: value for name, value in given.items() if name in known})
-        action, memory[0] = found if isinstance(found, tuple) else (found, None)
+        answer = model.predict(observation, **{name: value for name, value in given.items() if name in known})
+        action, memory[0] = answer if isinstance(answer, tuple) else (answer, None)
         return np.asarray(action)
 
     return policy

@@ -31,9 +31,14 @@ ATTEMPTS = 3
 
 
 def on_processes(plan: Plan, folder: Path, entries: tuple[PlannedScene, ...], jobs: int) -> Iterator[Written | int]:
-    """As `write_scene` gives them, of all scenes in any order; a count is negative where frames were lost.
+    """Write scenes in several processes.
 
-    Errors: what a worker raised; InputError if workers keep dying.
+    Yields:
+        Counts and files as of `write_scene`, in any order; a count is negative where frames were lost.
+
+    Raises:
+        InputError: if workers keep dying.
+        Exception: as a worker raised it.
     """
     waiting = deque(entries)
     deaths: dict[str, int] = {}
@@ -65,12 +70,14 @@ def on_processes(plan: Plan, folder: Path, entries: tuple[PlannedScene, ...], jo
 
 @dataclass
 class _Worker:
-    """A process, our end of its pipe, the scene it is at, and how many frames of that are done."""
+    """A process, and the scene it works on."""
 
     process: BaseProcess
     pipe: Connection
+    """Our end of its pipe."""
     entry: PlannedScene
     frames: int = 0
+    """Frames of the scene that are done."""
 
     @classmethod
     def start(cls, plan: Plan, folder: Path, entry: PlannedScene) -> _Worker:
@@ -102,7 +109,7 @@ def _count_death(deaths: dict[str, int], entry: PlannedScene) -> None:
     if deaths[entry.path] == ATTEMPTS:
         raise InputError(
             f"worker processes died {ATTEMPTS} times over {entry.path}, perhaps for want of memory; "
-            "run the same command with fewer jobs: it goes on with what is not done"
+            "run the same command with fewer jobs: it makes the others"
         )
 
 

@@ -68,7 +68,7 @@ def _result(ray: ModuleType, reference: object) -> Written:
     except ray.exceptions.RayError as error:
         raise InputError(
             f"the cluster lost a scene {RETRIES + 1} times ({type(error).__name__}); "
-            "run the same command again: it goes on with what is not done"
+            "run the same command again: it makes the others"
         ) from error
     return written
 

@@ -69,6 +69,7 @@ def register() -> None:
     """Register every id that is not registered yet, each with the native vector environment of its class.
 
     Example:
+        >>> import gymnasium
         >>> register()
         >>> "spikecam_env/Track-v1" in gymnasium.registry
         True
