@@ -81,7 +81,7 @@ def test_a_vector_of_every_kind_of_scene_has_the_bits_of_single_environments(nam
 
 
 def test_every_id_has_a_vector() -> None:
-    """Of the class of its single environment; what the kinds show of it holds for all that are made with that class."""
+    """Of the class of its single environment; the kinds of scenes stand for all ids of that class."""
     for name in (*ENVIRONMENTS, *TASK_ENVIRONMENTS):
         spec = gymnasium.spec(name)
         assert spec.vector_entry_point == f"spikecam_env.envs.vector:{str(spec.entry_point).replace(':', '.')}"

@@ -1,4 +1,4 @@
-"""Each hidden catalogue effect does what its law says."""
+"""Each hidden catalogue effect follows its law."""
 
 from __future__ import annotations
 
@@ -114,7 +114,7 @@ def test_common_noise_has_its_variance_and_lag_minus_one_half(name, parameters, 
     camera = plain_camera((32, 32), spread=0.2)
     quiet, noisy = (filmed(camera, 0.3, 4000, h).mean(axis=(1, 2)) for h in ([], [hidden(name, **parameters)]))
     extra = noisy.var() - quiet.var()
-    # Pixels that fired together keep what the threshold then was, and meet again: between one and two times the law.
+    # Pixels that fired together keep the threshold of that moment, and meet again: between one and two times the law.
     most = 1.0 if name == "clock_jitter" else 2.0
     near(extra, variance * (1 + most) / 2, variance * (most - 1) / 2 + 0.2 * variance + 4e-6)
     lag = (np.mean((noisy[1:] - 0.3) * (noisy[:-1] - 0.3)) - np.mean((quiet[1:] - 0.3) * (quiet[:-1] - 0.3))) / extra

@@ -133,8 +133,8 @@ def test_small_cameras_have_an_eighth_of_the_data_and_effects_as_many_of_their_l
     assert [c.group for c in SMALL["verify"]] == [c.group for c in LAWS["verify"]]
 
 
-def test_what_shows_an_effect_goes_by_the_power_of_its_strength_that_the_diagnosis_takes():
-    """But of pixels: how many are hot or dead is counted, though the diagnosis draws units to see what they show."""
+def test_the_sign_of_an_effect_goes_by_the_power_of_its_strength_that_the_diagnosis_takes():
+    """But of pixels: the number of hot or dead ones counts, though the diagnosis draws units to see their effect."""
     for name in set(CATALOGUE) - {"hot_pixels", "dead_pixels"}:
         assert limits()[name].power == candidate(name).power, name
 
