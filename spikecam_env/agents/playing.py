@@ -30,13 +30,7 @@ class Actor(Protocol):
 
 
 def policy_of(policy: Any) -> tuple[Policy, dict[str, Any]]:
-    """Anything that acts, as `envs.score.play` takes it.
-
-    Args:
-        policy: as of `agents.evaluate`.
-
-    Returns:
-        The policy, and the keywords of the environment that it needs.
+    """A policy of `agents.evaluate` as `envs.score.play` takes it, and the keywords of its environment.
 
     Raises:
         InputError: for anything that cannot act.

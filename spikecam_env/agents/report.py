@@ -59,13 +59,7 @@ def _draw_lines(axes: Axes, results: Sequence[Result], sights: Sequence[str]) ->
 
 
 def pictures(actor: Actor, env: gymnasium.Env[Any, Any], seed: int) -> Iterator[NDArray[np.uint8]]:
-    """Pictures (rows, columns, 3) uint8 of an episode, one a step, ENLARGED, with the middle marked.
-
-    Args:
-        actor: plays the episode.
-        env: with `render_mode="rgb_array"`.
-        seed: of the episode.
-    """
+    """Pictures (rows, columns, 3) of an episode, one a step, ENLARGED, the middle marked; `env` renders rgb_array."""
     observation, _ = env.reset(seed=seed)
     actor.begin()
     over = False

@@ -190,10 +190,7 @@ ALONG = "along"
 
 
 def agents_along(out: Path) -> dict[int, Path]:
-    """Files of the agents that `train_agent` kept on the way, by their steps, in order.
-
-    Args:
-        out: folder of the run.
+    """Files of the agents that `train_agent` kept on the way in this folder, by their steps, in order.
 
     Example:
         >>> from pathlib import Path

@@ -28,7 +28,7 @@ def on_ray(ray: ModuleType, plan: Plan, folder: Path, entries: tuple[PlannedScen
     """Files as they are done, in any order, and with each its number of frames.
 
     Args:
-        ray: as `connected` gives it, to a cluster where the package is installed.
+        ray: as of `connected`, to a cluster where the package is installed.
         plan: of the dataset.
         folder: storage that all machines of the cluster share.
         entries: scenes to make.

@@ -86,12 +86,7 @@ def append_truth(writer: SpikeWriter, scene: Scene, frame: int) -> None:
 
 
 def sha256_of(path: Path, progress: Callable[[int], object] | None = None) -> str:
-    """SHA-256 of a file, in hexadecimal.
-
-    Args:
-        path: of the file.
-        progress: called with the bytes read, piece by piece.
-    """
+    """SHA-256 of a file, in hexadecimal; `progress` is called with the numbers of bytes read, piece by piece."""
     digest = hashlib.sha256()
     with path.open("rb") as file:
         while piece := file.read(_READ_BYTES):

@@ -49,15 +49,7 @@ class DeviceCameras:
         return 0 if number in self._new else int(self._batch.frame[number])
 
     def exposed(self, each: ForEach, numbers: Sequence[int]) -> Blocks:
-        """The next block of some cameras, along the paths that they follow.
-
-        Args:
-            each: calls a function of each number, on the thread of that environment.
-            numbers: all, or some whose episodes begin with this block.
-
-        Returns:
-            Their blocks, in this order.
-        """
+        """The next block of all cameras, or of those whose episodes begin with it; `each` works on their threads."""
         self._check_models()
         envs = [self._envs[n] for n in numbers]
         batch = self._batch_of(numbers)
@@ -119,11 +111,7 @@ class BatchedCamera:
 
 
 def check_on_device(law: Observation, render_mode: str | None) -> None:
-    """Refuse observations that take no tensors, and rendered pictures.
-
-    Raises:
-        InputError: for either.
-    """
+    """InputError for an observation that takes no tensors, and for rendered pictures."""
     if not law.takes_tensors:
         raise InputError(f"obs is {type(law).__name__}; with a device it may be 'spikes', 'multibinary', 'tfp', 'rate'")
     if render_mode is not None:

@@ -103,16 +103,7 @@ class StepOutcome:
 def steps_of(
     course: StepOutcome, act: Callable[[StepOutcome], NDArray[np.float32]], most: int | None = None
 ) -> Iterator[StepOutcome]:
-    """The courses after each step, up to the one that is over.
-
-    Args:
-        course: The episode's beginning.
-        act: Gives the next action.
-        most: Steps at most; by default `Episode.steps`.
-
-    Returns:
-        An iterator over the courses.
-    """
+    """The courses after each step, up to the one that is over, or `most` steps (default `Episode.steps`)."""
     last = course.episode.steps if most is None else most
     while not (course.terminated or course.truncated) and course.standing.step < last:
         course = course.after(np.clip(act(course), -1.0, 1.0).tolist())

@@ -75,34 +75,14 @@ class Evaluation:
         success: float,
         returns: float,
     ) -> Evaluation:
-        """The evaluation of episodes.
-
-        Args:
-            task: id of the task.
-            performances: of the policy, in each episode.
-            nothing: of doing nothing, in the same episodes.
-            oracle: of the oracle, in the same episodes.
-            success: share of episodes that end in success.
-            returns: mean sum of rewards.
-        """
-        reached, still, best = (np.asarray(each, float) for each in (performances, nothing, oracle))
+        """The evaluation of episodes, from the performances of policy, nothing and oracle in each."""
+        reached, still, best = (np.asarray(one, float) for one in (performances, nothing, oracle))
         mean, low_end, high_end = float(reached.mean()), float(still.mean()), float(best.mean())
         method = "Wilson" if np.isin(reached, (0.0, 1.0)).all() else "bootstrap"
         interval = _wilson if method == "Wilson" else _bootstrap
         low, high = interval(reached, still, best)
-        return cls(
-            task,
-            score(mean, low_end, high_end),
-            low,
-            high,
-            method,
-            mean,
-            low_end,
-            high_end,
-            success,
-            returns,
-            tuple(reached.tolist()),
-        )
+        of_policy, each = score(mean, low_end, high_end), tuple(reached.tolist())
+        return cls(task, of_policy, low, high, method, mean, low_end, high_end, success, returns, each)
 
     def __str__(self) -> str:
         count = len(self.performances)

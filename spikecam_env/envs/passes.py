@@ -35,16 +35,13 @@ class Passes:
 
 
 def passes(scene: Placed, target: str, last: int, cuts_to: int | None = None) -> Passes:
-    """Passes of a target.
+    """Passes of a target from frame 0 on.
 
     Args:
-        scene: Shows the target.
-        target: Its name.
-        last: Last frame of which the top speed counts.
-        cuts_to: Last frame at which the scene may start over; by default `last`.
-
-    Returns:
-        The passes from frame 0 on.
+        scene: shows the target.
+        target: its name.
+        last: last frame of which the top speed counts.
+        cuts_to: last frame at which the scene may start over; by default `last`.
     """
     every = max(1, round(EVERY_S * scene.frame_rate_hz))
     rows, columns = scene.shape

@@ -67,19 +67,16 @@ class Played:
 
 
 def play(env: gymnasium.Env[Any, Any], policy: Policy, seeds: Iterable[int], progress: bool | None = False) -> Played:
-    """A policy's episodes.
+    """Play a policy's episodes, one a seed.
 
     Args:
-        env: Of an id of this package, wrapped or not.
-        policy: Gives the actions.
-        seeds: One an episode.
-        progress: Whether a bar is shown; None: in a terminal.
-
-    Returns:
-        Means over the episodes.
+        env: of an id of this package, wrapped or not.
+        policy: gives the actions.
+        seeds: of the episodes.
+        progress: whether a bar is shown; None: in a terminal.
 
     Raises:
-        InputError: For an environment without a performance.
+        InputError: for an environment without a performance.
     """
     inner = _aiming(env)
     bar = tqdm(seeds, desc="episodes", unit="episode", leave=False, disable=None if progress is None else not progress)
@@ -113,10 +110,6 @@ def ends(env: gymnasium.Env[Any, Any], seeds: Sequence[int]) -> tuple[list[float
     """Performance of doing nothing and of the oracle: where a score is 0, and where it is 1.
 
     They look at no pictures, so that no camera is exposed (`envs.course`).
-
-    Args:
-        env: As of `play`.
-        seeds: One an episode.
 
     Returns:
         (nothing's, the oracle's), of each episode.

@@ -173,12 +173,8 @@ class SpikeCameraVectorEnv(VectorEnv[Any, Any, Any]):
         Args:
             actions: (N, numbers) in [-1, 1]; values beyond are cut.
 
-        Returns:
-            (observation, reward, terminated, truncated, info), each with a leading axis N.
-
         Raises:
-            InputError: for actions of another shape or type, and for numbers that are not finite; nothing is stepped
-                then.
+            InputError: for actions of another shape or type, or that are not finite; nothing is stepped then.
             NotReadyError: before the first reset, after `close`, and, where DISABLED, where an episode is over.
         """
         self._open()
@@ -202,19 +198,7 @@ class SpikeCameraVectorEnv(VectorEnv[Any, Any, Any]):
         return None if self.render_mode is None else tuple(env.render() for env in self.envs)
 
     def call(self, name: str, *args: Any, **kwargs: Any) -> tuple[Any, ...]:
-        """An attribute of every environment, called where it can be; as of gymnasium's vector environments.
-
-        Args:
-            name: of the attribute.
-            args: of the call.
-            kwargs: of the call.
-
-        Returns:
-            N values.
-
-        Raises:
-            AttributeError: for an attribute that the environments do not have.
-        """
+        """An attribute of every environment, called where it can be; as of gymnasium's vector environments."""
 
         def of(n: int) -> Any:
             attribute = self.envs[n].get_wrapper_attr(name)
@@ -231,7 +215,7 @@ class SpikeCameraVectorEnv(VectorEnv[Any, Any, Any]):
         """Set an attribute of every environment.
 
         Args:
-            name: of the attribute.
+            name: any.
             values: a list or tuple of N, or one value for all.
 
         Raises:
@@ -258,11 +242,7 @@ class SpikeCameraVectorEnv(VectorEnv[Any, Any, Any]):
         return self.get_attr("np_random")
 
     def close_extras(self, **kwargs: Any) -> None:
-        """Close every environment on its thread, and end the threads.
-
-        Args:
-            kwargs: `waits=False` does not wait until that is done.
-        """
+        """Close every environment on its thread, and end the threads; `waits=False` does not wait for that."""
         self._workers.close(lambda n: self.envs[n].close(), range(self.num_envs), **kwargs)
 
     def __del__(self) -> None:

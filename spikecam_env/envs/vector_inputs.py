@@ -41,9 +41,6 @@ def checked_limit(steps: Any, usual: int | None = None) -> int | None:
         steps: 1 or more; -1 for no limit, and None for the usual one, as `gymnasium.make` has them.
         usual: the limit where none is given; None for no limit.
 
-    Returns:
-        The steps, or None for no limit.
-
     Raises:
         InputError: for anything else.
 
@@ -131,11 +128,8 @@ def checked_actions(actions: Any, shape: tuple[int, ...]) -> NDArray[Any]:
     """Actions of all environments, of finite numbers; values beyond [-1, 1] are cut by each environment.
 
     Args:
-        actions: as they were given: an array or a tensor, or lists of numbers.
+        actions: an array or a tensor, or lists of numbers.
         shape: (N, numbers).
-
-    Returns:
-        An array of this shape.
 
     Raises:
         InputError: for another shape, for values of another type, and for numbers that are not finite.

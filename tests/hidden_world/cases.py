@@ -2,8 +2,8 @@
 
 Groups of no or one effect: `none`, `strong` (3 to 10 times the limit), `weak` (1 to 3), `severe` (30 to 100).  Groups
 of special cases: `base` (the base model's own effects, told `ideal`), `outside`, `left_out` (a catalogue effect, its
-name withheld), `tricky`.  Groups of several effects: `pair` (3 to 10 each), `strong_pair` and `triple` (5 to 100 each, of
-different families).
+name withheld), `tricky`.  Groups of several effects: `pair` (3 to 10 each), `strong_pair` and `triple` (5 to 100 each,
+of different families).
 
 The sets `quick` and `full` hide effects by their near laws only; `laws` by near and far ones.  `small` is as `laws`, of
 small cameras that are recorded for less long: an eighth of the data, and effects as many limits of that strong.  No two

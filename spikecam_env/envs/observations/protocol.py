@@ -80,16 +80,7 @@ def restarted(law: Observation, view: CameraView, state: Any, which: Masks) -> A
 
 
 def replaced(state: Any, others: Any, which: Masks) -> Any:
-    """A state in which other streams take the place of some.
-
-    Args:
-        state: of N streams.
-        others: the state of as many streams as `which` selects, or of one that takes every place.
-        which: (N,).
-
-    Returns:
-        The state of N streams; arrays of the state before stay as they were.
-    """
+    """A state in which other streams, or one, take the place of those selected; the arrays of `state` stay."""
     if hasattr(state, "replaced"):
         return state.replaced(others, which)
     arrays = [with_rows(now, other, which) for now, other in zip(state, others, strict=True)]
@@ -97,15 +88,12 @@ def replaced(state: Any, others: Any, which: Masks) -> Any:
 
 
 def with_rows(values: Any, rows: Any, which: Masks) -> Any:
-    """Values of N streams with others in the place of some.
+    """A copy of values of N streams with others in the place of some.
 
     Args:
         values: an array or tensor (N, ...), or a dictionary of such.
         rows: the same of as many streams as `which` selects, or of one that takes every place.
         which: (N,).
-
-    Returns:
-        A copy.
 
     Example:
         >>> with_rows(np.zeros(3), np.array([7.0]), np.array([False, True, False])).tolist()
