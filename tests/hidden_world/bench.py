@@ -34,6 +34,11 @@ def plain_camera(
     )
 
 
+def near(value: float, expected: float, tolerance: float) -> None:
+    print(f"{value:.5g}, expected {expected:.5g} +- {tolerance:.2g}")
+    assert abs(value - expected) <= tolerance
+
+
 def filmed(
     camera: Camera, light: Light | float, frames: int, hidden: Sequence[Hidden] = (), seed: int = 1
 ) -> NDArray[np.uint8]:

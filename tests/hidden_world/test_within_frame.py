@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from tests.hidden_world.bench import filmed, hidden, intervals, plain_camera, walk_of_spikes
+from tests.hidden_world.bench import filmed, hidden, intervals, near, plain_camera, walk_of_spikes
 from tests.hidden_world.light import Light
 from tests.hidden_world.unit import SWING_V
 from tests.hidden_world.waves import Clock, Flashes, Polygon, Pulses, Rise, Sine, SlewingClock, Square, Wave
@@ -15,11 +15,6 @@ from tests.hidden_world.waves import Clock, Flashes, Polygon, Pulses, Rise, Sine
 QUIET = plain_camera((32, 32), electrons=0.0, spread=0.0)
 LOOSE = plain_camera((32, 32), electrons=2e3, kappa=0.05, spread=0.1)
 """Pixels that keep no phase: the spikes of a frame are independent."""
-
-
-def near(value: float, expected: float, tolerance: float) -> None:
-    print(f"{value:.5g}, expected {expected:.5g} +- {tolerance:.2g}")
-    assert abs(value - expected) <= tolerance
 
 
 @pytest.mark.parametrize(
