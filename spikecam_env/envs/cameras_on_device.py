@@ -8,6 +8,7 @@ Where the camera looks, rewards and ends are plain Python on the host: actions g
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -16,9 +17,9 @@ import torch
 from scenes.planes_on_device import planes_on
 from spikecam_env.envs.cameras_on_host import by_place
 from spikecam_env.envs.observations import Blocks, Observation
-from spikecam_env.envs.spike_camera import ForEach, SpikeCameraEnv
+from spikecam_env.envs.spike_camera import ForEach, SpikeCameraEnv, lights_of
 from spikecam_env.errors import InputError
-from spikecam_env.sensor import Keyframes, SensorModel, SpikeSensorBatch
+from spikecam_env.sensor import SensorModel, SpikeSensorBatch
 
 
 class DeviceCameras:
@@ -53,7 +54,7 @@ class DeviceCameras:
         self._check_models()
         envs = [self._envs[n] for n in numbers]
         batch = self._batch_of(numbers)
-        light = self._light(envs, by_place(each, numbers))
+        light = lights_of(envs, partial(planes_on, device=self.device), by_place(each, numbers))
         spikes: Any = batch.step(light, envs[0].frames_per_step)
         if batch is not self._batch:
             self._batch.exchange(numbers, batch)
@@ -83,15 +84,6 @@ class DeviceCameras:
             self._envs[number].use_sensor(BatchedCamera(self, number, self._batch.models[number]))
         if others:
             raise InputError(f"environment {others[0]} has another model; with a device all episodes keep theirs")
-
-    def _light(self, given: Sequence[SpikeCameraEnv], each: ForEach) -> list[Keyframes]:
-        envs: Any = given
-        flat = [n for n, env in enumerate(envs) if not env.renders]
-        other = [n for n, env in enumerate(envs) if env.renders]
-        planes = [envs[n].scene.plane(*envs[n].next_block) for n in flat]
-        light = dict(zip(flat, planes_on(planes, self.device), strict=True))
-        light |= zip(other, each(lambda n: envs[n].scene.radiance(*envs[n].next_block), other), strict=True)
-        return [light[n] for n in range(len(envs))]
 
 
 class BatchedCamera:

@@ -44,7 +44,11 @@ def checked_options(options: Any, rules: Mapping[str, Rule]) -> dict[str, Any]:
 
 
 def as_dictionary(options: Any, name: str = "options") -> dict[str, Any]:
-    """A copy of the options; raises InputError unless they are None or a dictionary by name."""
+    """A copy of the options.
+
+    Raises:
+        InputError: unless they are None or a dictionary by name.
+    """
     if options is None:
         return {}
     if not isinstance(options, Mapping) or not all(isinstance(key, str) for key in options):

@@ -129,7 +129,7 @@ class SceneEnv(AimingEnv):
         super().close()
 
     def _build(self, seed: int) -> Placed:
-        """The scene of this seed, not yet exposed; raises InputError where there is nothing to follow in it."""
+        """The scene of this seed, not yet exposed; InputError where there is nothing to follow in it."""
         return _followed(self.scene_name, self.target, self.shape, seed, self.model.frame_rate_hz)
 
     def _draw(self, rng: np.random.Generator, options: dict[str, Any]) -> Episode:

@@ -94,7 +94,7 @@ def play(env: gymnasium.Env[Any, Any], policy: Policy, seeds: Iterable[int], pro
 
 
 def _aiming(env: gymnasium.Env[Any, Any]) -> AimingEnv:
-    """The environment of this package below all wrappers; raises InputError where there is none."""
+    """The environment of this package below all wrappers; InputError where there is none."""
     inner = env.unwrapped
     if not isinstance(inner, AimingEnv):
         raise InputError(f"{type(inner).__name__} is no AimingEnv and has no performance; take an id of this package")

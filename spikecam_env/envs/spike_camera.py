@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from functools import partial
 from math import isfinite
 from os import PathLike
 from typing import Any, ClassVar, TypeVar
@@ -13,7 +14,7 @@ from gymnasium import spaces
 from numpy.typing import ArrayLike, NDArray
 
 from scenes.exposure import lit
-from scenes.planes import PlanarScene, painted_planes
+from scenes.planes import PlanarScene, Plane, painted_planes
 from scenes.protocol import MOST_LIGHT, Gaze, Scene
 from scenes.renderers.shared import begin_to_use, done_with
 from spikecam_env.checked import (
@@ -41,6 +42,8 @@ Judge = Callable[[Any, float, Gaze], tuple[float, bool]]
 T = TypeVar("T")
 ForEach = Callable[[Callable[[int], Any], Sequence[int]], list[Any]]
 """(work, numbers) -> the results of work, one a number."""
+Paint = Callable[[list[Plane]], list[Keyframes]]
+"""Planes -> the light of each, on the processor or on a device."""
 
 
 def in_turn(work: Callable[[int], T], numbers: Sequence[int]) -> list[T]:
@@ -323,7 +326,7 @@ class SpikeCameraEnv(gymnasium.Env[Any, NDArray[np.float32]]):
         return info
 
     def _checked_model(self, model: SensorModel | str | PathLike[str]) -> SensorModel:
-        """The model of an episode; raises InputError where scenes of this environment are not of its frame rate."""
+        """The model of an episode; InputError where scenes of this environment are not of its frame rate."""
         loaded = _loaded(model)
         if loaded.frame_rate_hz != self.model.frame_rate_hz:
             raise InputError(
@@ -379,18 +382,18 @@ def expose(
         threads: of these calls.
         each: calls a function of the number of each scene that is no plane.
     """
-    lights = lights_of(envs, threads=threads, each=each)
+    lights = lights_of(envs, partial(painted_planes, threads=threads), each)
     spikes = step_together([env.sensor for env in envs], lights, envs[0].frames_per_step, outs=outs, threads=threads)
     for env, own, block in zip(envs, lights, spikes, strict=True):
         env.record(own, block)
 
 
-def lights_of(envs: Sequence[SpikeCameraEnv], *, threads: int | None = 1, each: ForEach = in_turn) -> list[Keyframes]:
-    """The light of the next block of every environment; arguments as of `expose`."""
+def lights_of(envs: Sequence[SpikeCameraEnv], paint: Paint, each: ForEach = in_turn) -> list[Keyframes]:
+    """The light of the next block of every environment; `each` as of `expose`."""
     flat = [n for n, env in enumerate(envs) if not env.renders]
     other = [n for n, env in enumerate(envs) if env.renders]
     planes = [envs[n].scene.plane(*envs[n].next_block) for n in flat]  # type: ignore[attr-defined]
-    light = dict(zip(flat, painted_planes(planes, threads), strict=True))
+    light = dict(zip(flat, paint(planes), strict=True))
     light |= dict(zip(other, each(lambda n: envs[n].scene.radiance(*envs[n].next_block), other), strict=True))
     return [light[n] for n in range(len(envs))]
 

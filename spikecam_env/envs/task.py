@@ -34,7 +34,11 @@ def drawn_within(rng: np.random.Generator, most: float) -> tuple[float, float]:
 
 
 def checked_limit(name: str, value: float | None, default: float) -> float:
-    """The most that something is [pixels, pixels/s], or the default for None; raises InputError below 0."""
+    """The most that something is [pixels, pixels/s], or the default for None.
+
+    Raises:
+        InputError: below 0.
+    """
     if value is None:
         return default
     if not 0 <= as_number(value) < np.inf:

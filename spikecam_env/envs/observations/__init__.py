@@ -59,7 +59,11 @@ OBSERVATIONS: dict[str, Callable[[], Observation]] = {
 
 
 def observation(obs: str | Observation) -> Observation:
-    """The observation of this name, or the one that was given; raises InputError for anything else."""
+    """The observation of this name, or the one that was given.
+
+    Raises:
+        InputError: for anything else.
+    """
     if isinstance(obs, Observation):
         return obs
     if not isinstance(obs, str):

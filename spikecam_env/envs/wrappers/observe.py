@@ -108,7 +108,11 @@ class VectorObserveSpikes(gymnasium.vector.VectorObservationWrapper):
 
 
 def viewed(space: spaces.Space[Any], env: Any) -> CameraView:
-    """The camera whose blocks fill a space; raises InputError where they are no blocks of spikes."""
+    """The camera whose blocks fill a space.
+
+    Raises:
+        InputError: where they are no blocks of spikes.
+    """
     frames, rows, columns = block_shape(space)
     one = getattr(env.unwrapped, "envs", [env])[0].unwrapped
     rate = one.model.frame_rate_hz if isinstance(one, SpikeCameraEnv) else CameraView.frame_rate_hz

@@ -133,7 +133,11 @@ def with_parameters(model: SensorModel, values: Mapping[str, float]) -> SensorMo
 
 
 def checked_range(name: str, limits: Any) -> tuple[float, float]:
-    """(low, high); raises InputError unless they are two finite numbers in this order."""
+    """(low, high) of a range.
+
+    Raises:
+        InputError: unless they are two finite numbers in this order.
+    """
     try:
         low, high = limits
     except (TypeError, ValueError) as error:
