@@ -35,7 +35,6 @@ from denoiser.training_loop import RUN_FILE, learn, save_progress
 from denoiser.training_options import TrainingOptions
 from denoiser.training_record import training_record
 from denoiser.weights import load_weights, save_weights
-from spikecam_env.checked import checked_number, checked_whole
 from spikecam_env.errors import InputError
 from spikecam_env.run_folder import run_folder
 from spikecam_env.torch_settings import torch_settings

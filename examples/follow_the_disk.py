@@ -1,4 +1,4 @@
-"""An agent that sees through the camera: it turns after a spinning disk by the centre of what changes.
+"""An agent that sees through the camera: it turns after a spinning disk by the centre of change.
 
 run:  python examples/follow_the_disk.py
 """

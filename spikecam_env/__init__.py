@@ -9,9 +9,15 @@ if stopping.is_command():  # before the imports below, which take a while in whi
     stopping.watch()
 
 from spikecam_env import envs
+from spikecam_env.envs.registration import OBSERVATIONS_ABOVE
 from spikecam_env.siblings import check_siblings
 from spikecam_env.version import __version__
 
 check_siblings()
+
+OBSERVATIONS_ABOVE |= {
+    "rate": ("denoiser.observation:Rate", {}),
+    "dim_rate": ("denoiser.observation:Rate", {"white": 0.1}),
+}
 
 __all__ = ["__version__", "envs"]

@@ -173,7 +173,7 @@ def _is_done(task: WorkItem, row: str, results: Results) -> bool:
 def _one_thread() -> None:
     import torch
 
-    from spikecam_env.datasets.worker import use_one_thread
+    from spikecam_env.datasets.processes import use_one_thread
 
     use_one_thread()
     torch.set_num_threads(1)

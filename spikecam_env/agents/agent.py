@@ -35,16 +35,21 @@ ENDING = ".pt"
 
 
 class Agent:
-    """task: an id, e.g. "Catch-v1"; obs: name of what it sees; policy: its network; training: how it was made.
+    """A trained policy; its observations are those of environments with `obs=obs, obs_state=True`.
 
-    The observations are those of environments with `obs=obs, obs_state=True`.
+    Args:
+        task: an id, e.g. "Catch-v1".
+        obs: name of its observation.
+        policy: its network.
+        training: record of its training.
 
-    >>> agent = Agent.load("Catch-v1")
-    >>> env = agent.make(split="test")
-    >>> observation, info = env.reset(seed=0)
-    >>> action = agent.act(observation)
-    >>> agent.obs, action.shape
-    ('tfp', (1,))
+    Example:
+        >>> agent = Agent.load("Catch-v1")
+        >>> env = agent.make(split="test")
+        >>> observation, info = env.reset(seed=0)
+        >>> action = agent.act(observation)
+        >>> agent.obs, action.shape
+        ('tfp', (1,))
     """
 
     def __init__(self, task: str, obs: str, policy: Policy, training: dict[str, Any] | None = None) -> None:
@@ -55,8 +60,8 @@ class Agent:
     def load(cls, source: str | os.PathLike[str]) -> Agent:
         """The shipped agent of a task's id, or the one in a file.
 
-        Raises InputError for a task without a shipped agent, and for a file that is missing, damaged or
-        of another kind.
+        Raises:
+            InputError: for a task without a shipped agent, and for a file that is missing, damaged or of another kind.
         """
         path = _path(source)
         data = read_plain(path)
@@ -72,10 +77,10 @@ class Agent:
         return cls(task, obs, policy, training)
 
     def save(self, path: str | os.PathLike[str]) -> None:
-        """Write a file; it appears whole.  Weights lose what float16 does not hold, one part in a thousand."""
+        """Write a file, which appears whole; weights are rounded to float16, one part in a thousand."""
         weights = {name: tensor.detach().half().contiguous() for name, tensor in self.policy.state_dict().items()}
-        what = {"task": self.task, "obs": self.obs, "recipe": self.policy.recipe.model_dump(), "weights": weights}
-        write_whole(path, {"format": FORMAT, **what, "training": self.training})
+        values = {"task": self.task, "obs": self.obs, "recipe": self.policy.recipe.model_dump(), "weights": weights}
+        write_whole(path, {"format": FORMAT, **values, "training": self.training})
 
     def make(self, **options: Any) -> gymnasium.Env[Any, Any]:
         """An environment of its task, as it sees it; options: of the environment, e.g. split="test"."""
@@ -83,13 +88,18 @@ class Agent:
         return gymnasium.make(f"spikecam_env/{self.task}", **{"obs": self.obs, "obs_state": True, **options})
 
     def begin(self) -> None:
-        """Forget what was seen: the next observation is the first of an episode, everywhere."""
+        """Forget all observations: the next one is the first of an episode, everywhere."""
         self._history = History(self.policy.recipe.lags, self.policy.recipe.pool)
 
     def act(self, observation: dict[str, NDArray[Any]], fresh: NDArray[np.bool_] | None = None) -> NDArray[np.float32]:
         """The action (A,), the policy's mean; with a leading axis N where the observation has one.
 
-        fresh: (N,) which of N are the first of an episode.  Raises InputError for an observation of another kind.
+        Args:
+            observation: picture, gaze and age.
+            fresh: (N,) which of N are the first of an episode.
+
+        Raises:
+            InputError: for an observation of another kind.
         """
         many = self._checked(observation)
         together = observation if many else {name: np.asarray(array)[None] for name, array in observation.items()}
@@ -117,8 +127,9 @@ class Agent:
 def shipped() -> list[str]:
     """Tasks of which an agent comes with the package.
 
-    >>> shipped()
-    ['Catch-v1', 'Exposure-v1', 'LowLight-v1', 'ReadSpin-v1', 'Saccade-v1', 'Track-v1']
+    Example:
+        >>> shipped()
+        ['Catch-v1', 'Exposure-v1', 'LowLight-v1', 'ReadSpin-v1', 'Saccade-v1', 'Track-v1']
     """
     return sorted(path.name[: -len(ENDING)] for path in _folder().glob(f"*{ENDING}"))
 
@@ -126,8 +137,9 @@ def shipped() -> list[str]:
 def is_file(name: str) -> bool:
     """Whether it can be a file's, and not that of a task.
 
-    >>> is_file("runs/catch/agent.pt"), is_file("Catch-v1")
-    (True, False)
+    Example:
+        >>> is_file("runs/catch/agent.pt"), is_file("Catch-v1")
+        (True, False)
     """
     return ENDING in name or os.sep in name
 

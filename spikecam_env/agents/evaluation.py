@@ -7,7 +7,6 @@ print(evaluate(model, "Catch-v1", stack=3))
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import Any
 
 import gymnasium
@@ -29,7 +28,7 @@ MOST_STACK = 1000
 
 
 def evaluate(
-    policy: Any,
+    policy: any,
     task: str,
     *,
     episodes: int | None = None,
@@ -37,7 +36,7 @@ def evaluate(
     split: str = "test",
     stack: int = 1,
     obs: str | Observation | None = None,
-    wrap: Callable[[Env], Env] | None = None,
+    wrap: callable[[Env], Env] | None = None,
     progress: bool | None = None,
     **options: Any,
 ) -> Evaluation:
@@ -46,24 +45,24 @@ def evaluate(
     The policy, the oracle and doing nothing have the same episodes: those of the seeds `seed`, `seed` + 1, and so on.
 
     Args:
-        policy: A callable, observation -> action; a model with `predict`, as of stable-baselines3, whose deterministic
+        policy: a callable, observation -> action; a model with `predict`, as of stable-baselines3, whose deterministic
             actions are taken; an `Agent` or `Tracker`; or a name: "oracle", "nothing", "random", or a shipped agent's.
-        task: An id, with or without `spikecam_env/`, e.g. "Catch-v1", or a scene's, e.g. "Fan-v0".
-        episodes: How many; by default 100 of Catch, 50 of Saccade and ReadSpin, 10 of others.
-        seed: Of the first episode.
+        task: an id, with or without `spikecam_env/`, e.g. "Catch-v1", or a scene's, e.g. "Fan-v0".
+        episodes: how many; by default 100 of Catch, 50 of Saccade and ReadSpin, 10 of others.
+        seed: of the first episode.
         split: "train" or "test", of tasks.
-        stack: Observations that the policy sees together, along the first axis, the newest last and zeros before the
+        stack: observations that the policy sees together, along the first axis, the newest last and zeros before the
             first: as `VecFrameStack` of stable-baselines3. For `FrameStackObservation`, which adds an axis, use `wrap`.
-        obs: Observation of the environment; by default an agent's own, or the environment's.
-        wrap: Called with the environment; returns it with the wrappers of the training.
-        progress: Whether a bar is shown; by default in a terminal.
-        options: Further keywords of the environment, e.g. `shape`.
+        obs: observation of the environment; by default an agent's own, or the environment's.
+        wrap: called with the environment; returns it with the wrappers of the training.
+        progress: whether a bar is shown; by default in a terminal.
+        options: further keywords of the environment, e.g. `shape`.
 
     Returns:
-        The score and what it is made of; `print` shows it.
+        The score and its parts; `print` shows it.
 
     Raises:
-        InputError: For an unknown task, a policy that cannot act, and observations or actions of another shape.
+        InputError: for an unknown task, a policy that cannot act, and observations or actions of another shape.
 
     Example:
         >>> import numpy as np
@@ -91,14 +90,14 @@ def stacked(env: Env, stack: int) -> Env:
     """The last observations together, along the first axis, the newest last.
 
     Args:
-        env: Gives arrays.
-        stack: How many; 1 leaves the environment as it is.
+        env: gives arrays.
+        stack: how many; 1 leaves the environment as it is.
 
     Returns:
         An environment whose observations are (stack * C, ...) of (C, ...); before the first there are zeros.
 
     Raises:
-        InputError: For observations that are no arrays.
+        InputError: for observations that are no arrays.
 
     Example:
         >>> import gymnasium
@@ -122,7 +121,7 @@ def _known(task: Any) -> str:
         if isinstance(task, str) and (name in known or name in gymnasium.registry):
             _check_kind(name)
             return name
-    raise unknown_name("task", task, (each.split("/")[1] for each in known))
+    raise unknown_name("task", task, (one.split("/")[1] for one in known))
 
 
 def _check_kind(name: str) -> None:
@@ -137,19 +136,19 @@ def _wrapped(env: Env, wrap: Any) -> Env:
     """The environment in the user's wrappers."""
     if wrap is None:
         return env
-    found = wrap(env) if callable(wrap) else None
-    if not isinstance(found, gymnasium.Env):
+    wrapped = wrap(env) if callable(wrap) else None
+    if not isinstance(wrapped, gymnasium.Env):
         raise InputError(f"wrap is {shown(wrap)}; give a function, environment -> environment")
-    return found
+    return wrapped
 
 
 def _check_spaces(policy: Any, env: Env, stack: int) -> None:
     """Raise InputError for a model that was made for other observations or actions."""
-    for of, its, there in (
+    for of, its, space in (
         ("observations", getattr(policy, "observation_space", None), env.observation_space),
         ("actions", getattr(policy, "action_space", None), env.action_space),
     ):
-        expected, found = getattr(its, "shape", None), there.shape
-        if expected is not None and tuple(expected) != found:
+        expected, shape = getattr(its, "shape", None), space.shape
+        if expected is not None and tuple(expected) != shape:
             hint = f"; stack is {stack}, obs and wrap may differ from its training" if of == "observations" else ""
-            raise InputError(f"the policy was made for {of} {tuple(expected)}, the task has {found}{hint}")
+            raise InputError(f"the policy was made for {of} {tuple(expected)}, the task has {shape}{hint}")

@@ -1,9 +1,8 @@
-"""What an agent remembers: the last pictures, and where the camera looked when it took them.
+"""The memory of an agent: the last pictures, and where the camera looked when it took them.
 
-    pictures   (N, L C, H, W) uint8      those of `lags` steps ago, the newest first
-    state      (N, S) float32            the gaze's motion in the last step and since each lag, the picture's age
-
-An episode begins as if its first picture had been there for ever, seen by a camera at rest.
+Pictures (N, L C, H, W) are those of `lags` steps ago, the newest first.  The state (N, S) is the gaze's motion in the
+last step and since each lag, and the picture's age.  An episode begins as if a camera at rest had always seen its first
+picture.
 """
 
 from __future__ import annotations
@@ -16,14 +15,21 @@ from numpy.typing import NDArray
 
 
 class PictureHistory(NamedTuple):
-    """pictures, state: see the head of this file."""
+    """Pictures and state of N streams."""
 
     pictures: NDArray[np.uint8]
+    """(N, L C, H, W), the newest first."""
     state: NDArray[np.float32]
+    """(N, S) float32."""
 
 
 class History:
-    """Of N streams.  lags: steps ago, rising from 0; pool: pictures are means over so many pixels squared."""
+    """The memory of N streams.
+
+    Args:
+        lags: steps ago of the pictures that are given, rising from 0.
+        pool: pictures are means over so many pixels squared.
+    """
 
     def __init__(self, lags: Sequence[int], pool: int = 1) -> None:
         self.lags, self.pool = tuple(lags), pool
@@ -31,7 +37,12 @@ class History:
         self._gazes: list[NDArray[np.float32]] = []
 
     def push(self, observation: dict[str, NDArray[Any]], fresh: NDArray[np.bool_]) -> PictureHistory:
-        """Observations (N, ...) with `obs_state`; fresh: (N,), which are the first of an episode."""
+        """Remember the next observations.
+
+        Args:
+            observation: (N, ...), with `obs_state`.
+            fresh: (N,), which are the first of an episode.
+        """
         picture = pooled(observation["picture"].view(np.uint8), self.pool)
         gaze = observation["gaze"].astype(np.float32)
         length = self.lags[-1] + 2

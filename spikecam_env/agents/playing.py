@@ -1,9 +1,8 @@
-"""What acts, as `envs.score` plays it, and the score that it reaches."""
+"""Policies of every form, as `envs.score` plays them, and the score of one."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from importlib import import_module
 from inspect import signature
 from typing import Any, Protocol
 
@@ -24,28 +23,24 @@ class Actor(Protocol):
     """`Agent` or `Tracker`."""
 
     def begin(self) -> None:
-        """Forget what was seen: an episode begins."""
+        """Forget all observations: an episode begins."""
 
     def act(self, observation: Any) -> NDArray[np.float32]:
         """The action."""
 
 
 def policy_of(policy: Any) -> tuple[Policy, dict[str, Any]]:
-    """Anything that acts, as `envs.score.play` takes it.
-
-    Args:
-        policy: As of `agents.evaluate`.
-
-    Returns:
-        The policy, and the keywords of the environment that it needs.
+    """A policy of `agents.evaluate` as `envs.score.play` takes it, and the keywords of its environment.
 
     Raises:
-        InputError: For anything that cannot act.
+        InputError: for anything that cannot act.
     """
     if isinstance(policy, str):
         if policy in BASELINES:
             return BASELINES[policy], {}
-        policy = import_module("spikecam_env.agents.agent").Agent.load(policy)
+        from spikecam_env.agents.agent import Agent  # torch takes seconds
+
+        policy = Agent.load(policy)
     if isinstance(policy, type):
         raise InputError(f"policy is the class {policy.__name__}; give an instance of it")
     if hasattr(policy, "begin") and hasattr(policy, "act"):
@@ -80,8 +75,8 @@ def _predicting(model: Any) -> Policy:
         begins = env.standing.step == 0
         memory[0] = None if begins else memory[0]
         given = {"state": memory[0], "episode_start": np.array([begins]), "deterministic": True}
-        found = model.predict(observation, **{name: value for name, value in given.items() if name in known})
-        action, memory[0] = found if isinstance(found, tuple) else (found, None)
+        answer = model.predict(observation, **{name: value for name, value in given.items() if name in known})
+        action, memory[0] = answer if isinstance(answer, tuple) else (answer, None)
         return np.asarray(action)
 
     return policy

@@ -1,10 +1,14 @@
 """The network of an agent: it finds places in the pictures, and steers by them.
 
     maps      = norm(conv(conv(conv(pictures))))                      (M, h, w), of a picture together: mean 0, spread 1
+
     place     = sum softmax(maps) * (column, row)                     in [-1, 1], an expected place a map
-    level     = log mean exp(maps)                                    how strongly something is there
-    known     = mlp(places, levels, state)                            the action's mean, the value and where the target
-                                                                      is are linear in it
+
+    level     = log mean exp(maps)                                    strength of the thing at that place
+
+    known     = mlp(places, levels, state)                            features
+
+The action's mean, the value and the target's place are linear in the features.
 
 A softmax over places gives positions finer than the maps' pixels with few weights.  Source: Levine et al., JMLR 17
 (2016).  Without the norm the maps can grow in the first updates until softmax and tanh are saturated and no gradient
@@ -25,31 +29,30 @@ from spikecam_env.untrusted import Declared, Side
 
 
 class PolicyRecipe(Declared):
-    """What a network is.
-
-    channels  of an observation's picture
-    shape     (rows, columns) of it
-    high      largest value of a picture
-    lags      steps ago of the pictures that it sees, as of `History`
-    actions   numbers of an action
-    pool      pixels squared that are averaged before anything else
-    maps      whose places are found
-    width     of the convolutions and, times four, of what steers
-    answers   that an action can give, its last numbers, after the number that says it; 0 where the task asks nothing
-    """
+    """Sizes of a network."""
 
     channels: Annotated[int, Field(ge=1, le=256)]
+    """Channels of an observation's picture."""
     shape: Annotated[tuple[Side, Side], Field(strict=False)]
+    """(rows, columns) of the picture."""
     high: Annotated[int, Field(ge=1, le=255)]
+    """Largest value of a picture."""
     lags: Annotated[tuple[Annotated[int, Field(ge=0, le=1000)], ...], Field(min_length=1, max_length=16, strict=False)]
+    """Steps ago of the pictures that it sees, as of `History`."""
     actions: Annotated[int, Field(ge=1, le=16)]
+    """Numbers of an action."""
     pool: Annotated[int, Field(ge=1, le=8)] = 2
+    """Side of the squares of pixels that are averaged before anything else."""
     maps: Annotated[int, Field(ge=1, le=64)] = 12
+    """Maps whose places are found."""
     width: Annotated[int, Field(ge=1, le=64)] = 16
+    """Channels of the convolutions; a quarter of the units of the layers after them."""
     answers: Annotated[int, Field(ge=0, le=16)] = 0
+    """Answers that an action can give: its last numbers, after the number that says one.  0 where the task asks
+    nothing."""
 
     def network(self) -> Policy:
-        """With weights at random."""
+        """A network with random weights."""
         return Policy(self)
 
 

@@ -1,13 +1,15 @@
-"""Proximal policy optimisation, in one file: a policy learns from what many environments give.
+"""Proximal policy optimisation, in one file: a policy learns from the steps of many environments.
 
     r      = p(action) / p_old(action)
+
     A      = sum_k (gamma decay)^k (reward + gamma V' - V)
+
     loss   = -E[min(r A, clip(r, 1 - c, 1 + c) A)] + (V - A - V_old)^2 / 2 + w (place - target)^2
 
 The last term asks the policy where the target is, which is known in training alone (`info["target"]`); w = 0 is plain
 PPO.  An agent that imitates plays its mean action, without noise, and has E[(mean - oracle's action)^2] in place of the
-first two terms: in the states that it has come to itself, in all rollouts of the leg, it learns what `envs.oracle`
-would do.  Where the oracle acts on what cannot be seen it learns the expectation: of an answer, its probability.
+first two terms.  It learns the actions of `envs.oracle` in the states that it has come to itself, of all rollouts of
+the leg.  Where the oracle acts on something unseen, the agent learns the expectation: of an answer, its probability.
 Source: DAgger, Ross et al., AISTATS 2011.
 
 An episode that ends by its time is worth V beyond its end; a decided one nothing.  Everything is drawn anew from
@@ -42,21 +44,29 @@ Samples = dict[str, Tensor]  # of a rollout, by name
 
 @dataclass(frozen=True)
 class PPO:
-    """steps: of all environments together; rollout: of each between updates; leg: updates; place: w;
-    imitate: the oracle, instead of what rewards teach."""
+    """Numbers of the method."""
 
     steps: int = 49_152
+    """Steps of all environments together."""
     rollout: int = 64
+    """Steps of each environment between updates."""
     leg: int = 16
+    """Updates between two saves."""
     epochs: int = 4
     minibatch: int = 256
     lr: float = 1e-3
+    """Learning rate at the start; it falls linearly to 0."""
     gamma: float = 0.98
     decay: float = 0.95
+    """Of the sum over later steps (generalised advantage estimation)."""
     clip: float = 0.2
+    """c of the loss."""
     place: float = 1.0
+    """w, weight of the loss of the target's place."""
     imitate: bool = False
+    """Learn from the oracle's actions, and not from rewards."""
     most_gradient: float = 0.5
+    """Norm to which gradients are cut."""
 
 
 def train(
@@ -70,19 +80,19 @@ def train(
     """Go on learning until `ppo.steps`.
 
     Args:
-        envs: The cameras that play.
-        run: Of a `Policy`.
-        ppo: How to learn.
-        seed: Of all that is drawn.
-        save: Called after every leg.
-        watch: Called after every update, with the steps so far; it must leave the policy as it is.
+        envs: the cameras that play.
+        run: of a `Policy`.
+        ppo: numbers of the method.
+        seed: of all draws.
+        save: called after every leg.
+        watch: called after every update, with the steps so far; it must leave the policy as it is.
     """
-    policy, a_rollout = run.network, ppo.rollout * envs.num_envs
+    policy, steps_a_rollout = run.network, ppo.rollout * envs.num_envs
     assert isinstance(policy, Policy)
     for weights in policy.parameters():  # all have moments, also those that a loss leaves alone: a run is one of all
         weights.grad = torch.zeros_like(weights)
-    updates = -(-ppo.steps // a_rollout)
-    for first in tqdm(range(run.step // a_rollout, updates, ppo.leg), desc="learning", unit="leg", disable=None):
+    updates = -(-ppo.steps // steps_a_rollout)
+    for first in tqdm(range(run.step // steps_a_rollout, updates, ppo.leg), desc="learning", unit="leg", disable=None):
         began, last = time.process_time(), min(first + ppo.leg, updates)
         drawn, *seeds = np.random.SeedSequence([seed, first]).generate_state(envs.num_envs + 1).tolist()
         torch.manual_seed(drawn)
@@ -93,8 +103,8 @@ def train(
             ended += episodes
             seen = [*seen, batch] if ppo.imitate else [batch]
             _learn(policy, run.optimiser, seen, ppo)
-            watch((update + 1) * a_rollout)
-        run.step, run.seconds = last * a_rollout, run.seconds + time.process_time() - began
+            watch((update + 1) * steps_a_rollout)
+        run.step, run.seconds = last * steps_a_rollout, run.seconds + time.process_time() - began
         means = np.mean(ended or [(0.0, 0.0, 0.0)], axis=0).tolist()
         row = dict(zip(("return", "performance", "success"), means, strict=True))
         run.curve.append({"steps": run.step, "cpu_s": run.seconds, "episodes": len(ended), **row})
@@ -114,31 +124,47 @@ class _Player:
     @torch.no_grad()
     def roll(self) -> tuple[Samples, list[Ended]]:
         """A rollout's samples by name, and the episodes that ended in it."""
-        rows, ended, sigma = [], list[Ended](), self.policy.log_sigma.exp()
+        steps, ended = [], list[Ended]()
         for _ in range(self.ppo.rollout):
-            pictures, state = map(torch.from_numpy, self.seen)
-            self.policy.watch(state)
-            mean, value, _ = self.policy(pictures, state)
-            place = self.policy.scaled(torch.from_numpy(np.stack(self.info["target"]).astype(np.float32)))
-            best = torch.from_numpy(self._oracles()) if self.ppo.imitate else mean
-            law = Normal(mean, sigma)
-            action = mean if self.ppo.imitate else law.sample()
-            observation, reward, terminated, truncated, self.info = self.envs.step(action.clamp(-1, 1).numpy())
-            played, self.over = ~self.over, terminated | truncated  # an episode's last picture is no step of it
-            self.seen = self.history.push(observation, ~played)
-            self.totals = np.where(played, self.totals + reward, 0.0)
-            figures = np.stack([self.totals, self.info["performance"], self.info["is_success"]], axis=1)
-            ended += map(tuple, figures[self.over].tolist())
-            known = (torch.from_numpy(np.array(x, np.float32)) for x in (reward, terminated, self.over, played))
-            rows.append((pictures, state, place, best, action, law.log_prob(action).sum(1), value, *known))
-        *samples, value, paid, decided, over, counts = (torch.stack(column) for column in zip(*rows, strict=True))
-        after = torch.cat([value[1:], self.policy(*map(torch.from_numpy, self.seen))[1][None]])
-        gain = _gain(paid + self.ppo.gamma * after * (1 - decided) - value, over, self.ppo)
-        names = ("pictures", "state", "place", "best", "action", "log_p", "gain", "worth")
-        return {k: x[counts > 0] for k, x in zip(names, (*samples, gain, gain + value), strict=True)}, ended
+            step, episodes = self._step()
+            steps.append(step)
+            ended += episodes
+        columns = {name: torch.stack([step[name] for step in steps]) for name in steps[0]}
+        value, over, played = (columns.pop(name) for name in ("value", "over", "played"))
+        reward, decided = columns.pop("reward"), columns.pop("decided")
+        _, last, _ = self.policy(*map(torch.from_numpy, self.seen))
+        after = torch.cat([value[1:], last[None]])
+        gain = _gain(reward + self.ppo.gamma * after * (1 - decided) - value, over, self.ppo)
+        columns |= {"gain": gain, "worth": gain + value}
+        return {name: column[played > 0] for name, column in columns.items()}, ended
+
+    def _step(self) -> tuple[Samples, list[Ended]]:
+        """A step everywhere: its numbers by name, and the episodes that ended with it."""
+        pictures, state = map(torch.from_numpy, self.seen)
+        self.policy.watch(state)
+        mean, value, _ = self.policy(pictures, state)
+        law = Normal(mean, self.policy.log_sigma.exp())
+        action = mean if self.ppo.imitate else law.sample()
+        step = {
+            "pictures": pictures,
+            "state": state,
+            "place": self.policy.scaled(torch.from_numpy(np.stack(self.info["target"]).astype(np.float32))),
+            "best": torch.from_numpy(self._oracles()) if self.ppo.imitate else mean,
+            "action": action,
+            "log_p": law.log_prob(action).sum(1),
+            "value": value,
+        }
+        observation, reward, terminated, truncated, self.info = self.envs.step(action.clamp(-1, 1).numpy())
+        played, self.over = ~self.over, terminated | truncated  # an episode's last picture is no step of it
+        self.seen = self.history.push(observation, ~played)
+        self.totals = np.where(played, self.totals + reward, 0.0)
+        known = {"reward": reward, "decided": terminated, "over": self.over, "played": played}
+        step |= {name: torch.from_numpy(np.array(values, np.float32)) for name, values in known.items()}
+        figures = np.stack([self.totals, self.info["performance"], self.info["is_success"]], axis=1)
+        return step, [tuple(row) for row in figures[self.over].tolist()]
 
     def _oracles(self) -> NDArray[np.float32]:
-        """(N, A) what the oracle would do now."""
+        """(N, A) actions of the oracle."""
         cameras: Any = self.envs.unwrapped
         return np.stack([oracle(env.course) for env in cameras.envs])
 

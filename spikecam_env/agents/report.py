@@ -24,8 +24,8 @@ def draw_curves(results: Sequence[Result], path: Path) -> None:
     """Draw learning curves: a panel a task, a line a run, a colour a sight.
 
     Args:
-        results: Of a study; those without agents on the way are left out.
-        path: The PNG to write; the score on test episodes over the steps of training.
+        results: of a study; those without agents on the way are left out.
+        path: the PNG to write; the score on test episodes over the steps of training.
     """
     learned = [result for result in results if result.along]
     tasks = sorted({result.case.task for result in learned}) or [""]
@@ -59,7 +59,7 @@ def _draw_lines(axes: Axes, results: Sequence[Result], sights: Sequence[str]) ->
 
 
 def pictures(actor: Actor, env: gymnasium.Env[Any, Any], seed: int) -> Iterator[NDArray[np.uint8]]:
-    """(rows, columns, 3) uint8 of an episode, a step each, ENLARGED, with the middle marked; env: with rgb_array."""
+    """Pictures (rows, columns, 3) of an episode, one a step, ENLARGED, the middle marked; `env` renders rgb_array."""
     observation, _ = env.reset(seed=seed)
     actor.begin()
     over = False
@@ -71,7 +71,7 @@ def pictures(actor: Actor, env: gymnasium.Env[Any, Any], seed: int) -> Iterator[
 
 
 ENLARGED = 6
-"""Pixels of a film a pixel of the camera."""
+"""Side of a camera's pixel in the film [pixels]."""
 MARK = (255, 180, 0)
 
 

@@ -1,4 +1,4 @@
-"""How well agents learn: every task, by what the agent sees and by the light, over seeds.
+"""How well agents learn: every task, by the observation and by the light, over seeds.
 
 A cell is a task, a sight and a light.  Its result follows from the cell, the seed and the steps of training.  Results
 are lines of a record, so that a study goes on where it was stopped.
@@ -36,31 +36,29 @@ R = TypeVar("R")
 
 SEEN = {"": "tfp", "-rate": "rate", "-clean": "clean"}
 READY = {f"{who}{ending}": sight for who in ("tracker", "shipped") for ending, sight in SEEN.items()}
-"""Who learns nothing in a study, by what is seen: the classical tracker, and the shipped agent, trained on `tfp`."""
+"""Players that learn nothing -> observation: the classical tracker, and the shipped agent, trained on `tfp`."""
 
 
 class StudyRun(Declared):
-    """A cell and a seed.
-
-    task      an id
-    sight     a name of `training.SIGHTS`, or of READY
-    interval  mean interval of a pixel [frames] that is played, of LowLight alone; None is the task's own light
-    trained   shortest and longest of training, of LowLight alone; None is as played
-    shape     (rows, columns) of the camera; None is the id's
-    imitate   whether the oracle is imitated (`agents.ppo`)
-    steps     of training; 0 of READY
-    episodes  of the test split that judge; None is `playing.episodes_of` the task
-    """
+    """A cell and a seed."""
 
     task: Name
+    """An id."""
     sight: Name
+    """A name of `training.SIGHTS`, or of READY."""
     interval: Positive | None = None
+    """Mean interval of a pixel in the test episodes [frames], of LowLight alone; None is the task's own light."""
     trained: Annotated[tuple[Positive, Positive], Field(strict=False)] | None = None
+    """Shortest and longest interval in training, of LowLight alone; None is that of the test."""
     shape: Annotated[tuple[Side, Side], Field(strict=False)] | None = None
+    """(rows, columns) of the camera; None is the id's."""
     imitate: bool = False
+    """Whether the oracle is imitated (`agents.ppo`)."""
     seed: Seed = 0
     steps: Whole = 0
+    """Steps of training; 0 of READY."""
     episodes: Count | None = None
+    """Episodes of the test split that judge; None is `playing.episodes_of` the task."""
 
     @property
     def cell(self) -> StudyRun:
@@ -69,12 +67,12 @@ class StudyRun(Declared):
 
     @property
     def played(self) -> Study:
-        """What is put before the agent on test episodes."""
+        """The problem of the test episodes."""
         return self._under(self._light)
 
     @property
     def learned(self) -> Study:
-        """What is put before the learner."""
+        """The problem of the learner."""
         return self._under(self.trained or self._light)
 
     @property
@@ -95,14 +93,17 @@ class StudyRun(Declared):
 
 
 class Result(Declared):
-    """score: on the test split; cpu_s: of training [s]; curve: as of `training`; along: rows of steps and of the score
-    on the first test episodes (`playing.episodes_along`) of the agents on the way."""
+    """The score of a run of a study."""
 
     case: StudyRun
     score: Annotated[float, Field(ge=-100, le=100)]
+    """Score on the test split."""
     cpu_s: Annotated[float, Field(ge=0)] = 0.0
+    """Processor time of training [s]."""
     curve: Annotated[tuple[dict[Name, float], ...], Field(strict=False)] = ()
+    """Rows as of `training`."""
     along: Annotated[tuple[dict[Name, float], ...], Field(strict=False)] = ()
+    """Steps and score of the agents on the way, on the first test episodes (`playing.episodes_along`)."""
 
 
 POINTS = 12
@@ -131,7 +132,7 @@ def cases(
         checked_number(interval, "interval", 1.0, unit="frames")
     if trained is not None and trained[0] > trained[1]:
         raise InputError(f"intervals of training are {trained}; give the shortest, then the longest")
-    found = [
+    runs = [
         StudyRun(task=task, sight=sight, interval=interval, shape=shape, seed=seed, episodes=episodes)
         if sight in READY
         else StudyRun(
@@ -150,21 +151,25 @@ def cases(
         for sight in sights
         for interval in (intervals if task.startswith("LowLight") and intervals else (None,))
     ]
-    for case in found:
+    for case in runs:
         if case.sight.startswith("shipped") and case.task not in shipped():
             raise unknown_name("agent", case.task, shipped())
-    return found
+    return runs
 
 
 def measure(cases: Sequence[StudyRun], out: Path) -> list[Result]:
-    """Of cases with one training: train, unless nothing is to be learned, and play the test episodes of each; out:
-    folder in which the run is kept."""
+    """Results of cases with one training: train, unless nothing is to be learned, and play the test episodes of each.
+
+    Args:
+        cases: that differ in their test episodes alone.
+        out: folder in which the run is kept.
+    """
     curve = _curve(cases[0], out)
     return [_played(case, curve, out) for case in cases]
 
 
 def _curve(case: StudyRun, out: Path) -> tuple[dict[str, float], ...]:
-    """Of its training, which is done or gone on with if it is not whole."""
+    """The curve of its training, which is done first or completed."""
     if case.sight in READY:
         return ()
     ppo = learner(case.steps, imitate=case.imitate)
@@ -190,7 +195,7 @@ def _along(case: StudyRun, env: gymnasium.Env[Any, Any], episodes: int, out: Pat
 
 
 def actor_of(case: StudyRun, out: Path, env: gymnasium.Env[Any, Any]) -> Actor:
-    """That plays a case: the tracker, the shipped agent, or the one whose training is kept in `out`."""
+    """The player of a case: the tracker, the shipped agent, or the one whose training is kept in `out`."""
     inner: Any = env.unwrapped
     if case.sight.startswith("tracker"):
         return Tracker(inner)
@@ -230,7 +235,11 @@ RECORD = "record.jsonl"
 
 
 def read_record(path: Path) -> list[Result]:
-    """Lines of a record; none where there is no file.  Raises InputError for anything else in it."""
+    """Lines of a record; none where there is no file.
+
+    Raises:
+        InputError: for anything else in it.
+    """
     if not path.exists():
         return []
     lines = enumerate(read_text(path).splitlines(), 1)
@@ -238,7 +247,14 @@ def read_record(path: Path) -> list[Result]:
 
 
 def spread(work: Callable[[T], R], items: Iterable[T], jobs: int, ray: str | None) -> Iterator[R]:
-    """Results in any order: of this process, of `jobs` processes, or of a Ray cluster (its address, or "local")."""
+    """Results in any order.
+
+    Args:
+        work: of an item.
+        items: any.
+        jobs: processes; 1 works in this one.
+        ray: address of a Ray cluster that works instead, or "local".
+    """
     if ray is not None:
         with connected(ray, jobs) as cluster:
             task = cluster.remote(num_cpus=1)(_done)
@@ -262,11 +278,11 @@ def summary(results: Sequence[Result]) -> list[dict[str, Any]]:
     cells: dict[StudyRun, list[Result]] = {}
     for result in results:
         cells.setdefault(result.case.cell, []).append(result)
-    return [_row(cell, found) for cell, found in cells.items()]
+    return [_row(cell, of_seeds) for cell, of_seeds in cells.items()]
 
 
-def _row(cell: StudyRun, found: list[Result]) -> dict[str, Any]:
-    scores = np.array([result.score for result in found])
+def _row(cell: StudyRun, of_seeds: list[Result]) -> dict[str, Any]:
+    scores = np.array([result.score for result in of_seeds])
     return {
         "task": cell.task,
         "sees": cell.sight,
@@ -275,6 +291,6 @@ def _row(cell: StudyRun, found: list[Result]) -> dict[str, Any]:
         "sd": float(scores.std(ddof=1)) if len(scores) > 1 else None,
         "seeds": len(scores),
         "steps": cell.steps,
-        "cpu [min]": float(np.mean([result.cpu_s for result in found]) / 60),
+        "cpu [min]": float(np.mean([result.cpu_s for result in of_seeds]) / 60),
         "learned at [frames]": cell.trained and "{:g} to {:g}".format(*cell.trained),
     }

@@ -1,13 +1,14 @@
 """A classical tracker: it finds the target in a picture of rates, and turns the camera by the motor's law.
 
-    Track, LowLight, Exposure    the centroid of what is brighter than its surroundings
+    Track, LowLight, Exposure    the centroid of pixels that are brighter than their surroundings
     Saccade                      the largest 8th angular harmonic, |sum p(r, phi) e^(8 i phi)|: spokes, at any angle
     Catch                        a line through the ball's places, met where it crosses the bright row
 
     place of the target seen from a camera at rest:  x = seen - middle + gaze
     motion in the next step:   its own, smoothed,  + `envs.oracle.approach(x - gaze)`
 
-Nothing is learned; what it knows of a task is above.  Observations are of `obs="tfp"` or "tfi", with the gaze.
+Nothing is learned; the table above holds all that it knows of a task.  Observations are of `obs="tfp"` or "tfi", with
+the gaze.
 """
 
 from __future__ import annotations
@@ -35,7 +36,7 @@ BLUR_PX = 1.5
 AROUND_SIDE = 1 / 4
 """Sigma of the surroundings that a target is brighter than [shorter sides]: a disc's diameter."""
 LEVEL = 0.5
-"""Of the brightest excess; what is below is background."""
+"""Of the brightest excess; less than this is background."""
 SMOOTH = 0.2
 """Weight of a step's motion in its mean: five steps, in which a path turns by 16 degrees."""
 FAR = 0.3
@@ -45,13 +46,18 @@ FAR = 0.3
 class Tracker:
     """Acts like an `Agent`: `begin` an episode, then `act(observation)`.
 
-    env  whose task, picture and motor it is made for; raises InputError for a task that it does not know
+    Args:
+        env: whose task, picture and motor it is made for.
 
-    >>> from spikecam_env.envs.tasks.env import TaskEnv
-    >>> env = TaskEnv("Track", obs="tfp", obs_state=True)
-    >>> observation, info = env.reset(seed=0)
-    >>> Tracker(env).act(observation).shape
-    (2,)
+    Raises:
+        InputError: for a task that it does not know.
+
+    Example:
+        >>> from spikecam_env.envs.tasks.env import TaskEnv
+        >>> env = TaskEnv("Track", obs="tfp", obs_state=True)
+        >>> observation, info = env.reset(seed=0)
+        >>> Tracker(env).act(observation).shape
+        (2,)
     """
 
     def __init__(self, env: AimingEnv) -> None:
@@ -68,7 +74,7 @@ class Tracker:
         self.begin()
 
     def begin(self) -> None:
-        """Forget what was seen."""
+        """Forget all observations."""
         self._places: list[Place] = []
         self._motion = np.zeros(2)
 
@@ -105,12 +111,13 @@ def _crossing(places: list[Place], motion: Place, rows: int) -> tuple[Place, Pla
 
 
 def brightest(side: int) -> Find:
-    """The centroid of what is brighter than its surroundings.
+    """The centroid of pixels that are brighter than their surroundings.
 
-    >>> picture = np.zeros((64, 64), np.float32)
-    >>> picture[20:23, 30:33] = 1.0  # a spot about column 31, row 21
-    >>> brightest(64)(picture).round(1).tolist()
-    [31.0, 21.0]
+    Example:
+        >>> picture = np.zeros((64, 64), np.float32)
+        >>> picture[20:23, 30:33] = 1.0  # a spot about column 31, row 21
+        >>> brightest(64)(picture).round(1).tolist()
+        [31.0, 21.0]
     """
 
     def find(picture: NDArray[np.float32]) -> Place | None:
@@ -124,10 +131,11 @@ def brightest(side: int) -> Find:
 def ball(side: int) -> Find:
     """The same above the bright row, where the ball has left it free.
 
-    >>> picture = np.zeros((64, 64), np.float32)
-    >>> picture[20:23, 30:33] = 1.0  # a spot about column 31, row 21
-    >>> ball(64)(picture).round(1).tolist()
-    [31.0, 21.0]
+    Example:
+        >>> picture = np.zeros((64, 64), np.float32)
+        >>> picture[20:23, 30:33] = 1.0  # a spot about column 31, row 21
+        >>> ball(64)(picture).round(1).tolist()
+        [31.0, 21.0]
     """
     above, bright = int((Catch.line - Catch.radius) * side) - 1, brightest(side)
 
@@ -141,10 +149,11 @@ def ball(side: int) -> Find:
 def spokes(side: int) -> Find:
     """The disc whose light has the largest 8th angular harmonic.
 
-    >>> y, x = np.mgrid[-32:32, -32:32]
-    >>> disc = (np.hypot(x, y) < 8) * (1 + np.cos(8 * np.arctan2(y, x)))  # eight spokes about column 32, row 32
-    >>> spokes(64)(disc.astype(np.float32)).round(1).tolist()
-    [32.0, 32.0]
+    Example:
+        >>> y, x = np.mgrid[-32:32, -32:32]
+        >>> disc = (np.hypot(x, y) < 8) * (1 + np.cos(8 * np.arctan2(y, x)))  # eight spokes about column 32, row 32
+        >>> spokes(64)(disc.astype(np.float32)).round(1).tolist()
+        [32.0, 32.0]
     """
     real, imaginary = _harmonic(Saccade.radius * side)
 
@@ -158,8 +167,9 @@ def spokes(side: int) -> Find:
 def centroid(weights: NDArray[np.float32]) -> Place | None:
     """(x, y) of non-negative weights (H, W); None where all are 0.
 
-    >>> centroid(np.float32([[0, 0, 0], [0, 1, 1]])).tolist()
-    [1.5, 1.0]
+    Example:
+        >>> centroid(np.float32([[0, 0, 0], [0, 1, 1]])).tolist()
+        [1.5, 1.0]
     """
     total = float(weights.sum())
     if total <= 0:

@@ -1,4 +1,4 @@
-"""From a task's name to a trained agent: what `spikecam train-agent` does.
+"""From a task's name to a trained agent, as `spikecam train-agent`.
 
 OUT/last.pt     to go on from (`denoiser.run`)
 OUT/agent.pt    the agent so far (`agents.agent`)
@@ -32,19 +32,19 @@ from spikecam_env.whole import write_text_whole
 
 @dataclass(frozen=True)
 class Study:
-    """What a learner is put before.
+    """The problem of a learner.
 
-    task     an id, e.g. "Catch-v1"
-    sight    a name of SIGHTS
-    options  further keywords of the environments
-
-    >>> Study("Catch-v1", sight="tfi", options={"split": "test"}).keywords
-    {'obs_state': True, 'obs': 'tfi', 'split': 'test'}
+    Example:
+        >>> Study("Catch-v1", sight="tfi", options={"split": "test"}).keywords
+        {'obs_state': True, 'obs': 'tfi', 'split': 'test'}
     """
 
     task: str
+    """An id, e.g. "Catch-v1"."""
     sight: str = "tfp"
+    """A name of SIGHTS."""
     options: dict[str, Any] = field(default_factory=dict)
+    """Further keywords of the environments."""
 
     def __post_init__(self) -> None:
         if f"spikecam_env/{self.task}" not in TASK_ENVIRONMENTS:
@@ -54,12 +54,12 @@ class Study:
 
     @property
     def name(self) -> str:
-        """Of the task, without its size and version."""
+        """Name of the task, without size and version."""
         return self.task.split("-")[0]
 
     @property
     def keywords(self) -> dict[str, Any]:
-        """Of an environment."""
+        """Keywords of an environment."""
         return {"obs_state": True, **SIGHTS[self.sight], **self.options}
 
     def make(self, **options: Any) -> gymnasium.Env[Any, Any]:
@@ -68,7 +68,7 @@ class Study:
         return gymnasium.make(f"spikecam_env/{self.task}", **{**self.keywords, **options})
 
     def make_vec(self, count: int) -> VectorEnv[Any, Any, Any]:
-        """Many."""
+        """A vector of so many environments."""
         register()
         name, mode = f"spikecam_env/{self.task}", "vector_entry_point"
         return gymnasium.make_vec(name, num_envs=count, vectorization_mode=mode, **self.keywords)
@@ -78,7 +78,7 @@ SIGHTS: dict[str, dict[str, Any]] = {
     **{obs: {"obs": obs} for obs in ("tfp", "tfi", "spikes", "rate", "dim_rate", "frame30", "frame1000")},
     "clean": {"obs": "tfp", "model": "ideal"},
 }
-"""What an agent sees, by name: an observation of the noisy camera, or `clean`, the rates of a camera without noise."""
+"""Observations by name: of the noisy camera, or `clean`, the rates of a camera without noise."""
 
 LAGS = {"Catch": (0, 2, 5), "Saccade": (0, 3), "ReadSpin": (0, 1, 2, 4), "LowLight": (0, 1, 2, 3, 4)}
 """Steps ago of the pictures that a task is learned from; others from (0, 4).  In the dark every spike counts."""
@@ -89,11 +89,12 @@ POOL = {"Saccade": 1, "ReadDigit": 1}
 def recipe_of(study: Study, envs: VectorEnv[Any, Any, Any]) -> PolicyRecipe:
     """The network for a task.
 
-    >>> study = Study("Catch-v1")
-    >>> cameras = study.make_vec(1)
-    >>> recipe_of(study, cameras).shape
-    (64, 64)
-    >>> cameras.close()
+    Example:
+        >>> study = Study("Catch-v1")
+        >>> cameras = study.make_vec(1)
+        >>> recipe_of(study, cameras).shape
+        (64, 64)
+        >>> cameras.close()
     """
     name, task = study.name, TASKS[study.name]
     spaces, action = envs.single_observation_space, envs.single_action_space
@@ -115,12 +116,15 @@ def recipe_of(study: Study, envs: VectorEnv[Any, Any, Any]) -> PolicyRecipe:
 def learner(steps: int | None = None, *, imitate: bool = False, plain: bool = False) -> PPO:
     """PPO of so many steps, by default those of the shipped agents.
 
-    imitate: the oracle, instead of what rewards teach.  A policy must not go far from where its rewards were paid; an
-    oracle's action stays right.  So each update learns from as many samples as a whole leg has.
-    plain: without the loss that asks for the target's place.
+    Args:
+        steps: of all environments together.
+        imitate: learn from the oracle's actions, and not from rewards.  A policy must not go far from where its rewards
+            were paid; an oracle's action stays right.  So each update learns from as many samples as a whole leg has.
+        plain: without the loss that asks for the target's place.
 
-    >>> learner(2048, imitate=True).imitate
-    True
+    Example:
+        >>> learner(2048, imitate=True).imitate
+        True
     """
     given: dict[str, Any] = {} if steps is None else {"steps": steps}
     given |= {"imitate": True, "epochs": PPO.leg} if imitate else {}
@@ -186,10 +190,7 @@ ALONG = "along"
 
 
 def agents_along(out: Path) -> dict[int, Path]:
-    """Files of the agents that `train_agent` kept on the way, by their steps, in order.
-
-    Args:
-        out: folder of the run.
+    """Files of the agents that `train_agent` kept on the way in this folder, by their steps, in order.
 
     Example:
         >>> from pathlib import Path

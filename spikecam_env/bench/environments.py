@@ -15,7 +15,7 @@ import time
 from collections.abc import Callable, Sequence
 from contextlib import closing
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import lru_cache, partial
 from typing import Any
 
 import gymnasium
@@ -24,6 +24,7 @@ from numpy.typing import NDArray
 from tqdm import tqdm
 
 import spikecam_env.envs  # noqa: F401
+from scenes.planes import painted_planes
 from spikecam_env.bench.learners import bench_learners
 from spikecam_env.envs.spike_camera import SpikeCameraEnv, lights_of
 from spikecam_env.sensor import Keyframes, step_together
@@ -182,11 +183,11 @@ def shares(one: Contestant, seconds: float, rounds: int) -> dict[str, float]:
     light: list[Keyframes] = []
 
     def paint() -> None:
-        light[:] = lights_of(one.envs, threads=threads)
+        light[:] = lights_of(one.envs, partial(painted_planes, threads=threads))
 
     def expose() -> None:
         for env in one.envs:  # the block of the last step once more
-            env.sensor.frame = env.asked[0]
+            env.sensor.frame = env.next_block[0]
         step_together([env.sensor for env in one.envs], light, OPTIONS["frames_per_step"], threads=threads)
 
     found = []

@@ -1,7 +1,7 @@
-"""Making a dataset: what is not done yet, in this process, in several, or on a Ray cluster; the same bytes each way.
+"""Making a dataset in this process, in several, or on a Ray cluster; the bytes are the same each way.
 
-A run may be killed at any time; the same call goes on where it was.  Files appear whole, and one that was not finished
-is made again from its first frame: a scene is seconds.
+A run may be killed at any time; the same call makes the missing files.  Files appear whole, and an unfinished one is
+made again from its first frame: a scene is seconds.
 """
 
 from __future__ import annotations
@@ -31,44 +31,58 @@ from spikecam_env.streams.packing import packed_bytes
 from spikecam_env.whole import clear_unfinished, is_unfinished
 
 AtWork = Callable[[Plan, Path, tuple[PlannedScene, ...]], Iterator[Written | int]]
-"""Files as they are done, in any order, and between them how many more frames are."""
+"""Files as they are done, in any order, and between them the numbers of frames done since."""
 
 
 @dataclass(frozen=True)
 class Built:
-    """What a run did: with which renderer, files made and files that were there, bytes of both; over all
-    workers, where the time went [s] and processor time [s].
+    """The result of a run, over all workers.
 
-    >>> plan = Plan("mine", (Entry("train/disk.h5", "disk", 0, 0),), shape=(8, 16), frames=100)
-    >>> build(plan, "small").made, build(plan, "small").kept
-    (1, 1)
+    Example:
+        >>> plan = Plan("mine", (PlannedScene("train/disk.h5", "disk", 0, 0),), shape=(8, 16), frames=100)
+        >>> build(plan, "small").made, build(plan, "small").kept
+        (1, 1)
     """
 
     renderer: str
+    """Back-end that drew."""
     made: int
+    """Files that this run made."""
     kept: int
+    """Files that were complete before."""
     bytes: int
+    """Size of all files."""
     seconds: dict[str, float]
+    """Purpose -> time spent [s]."""
     processor_s: float
+    """Processor time [s]."""
 
 
 def build(plan: Plan, folder: str | Path, *, jobs: int = 1, ray: str | None = None, progress: bool = False) -> Built:
     """Make a dataset in `folder`, or go on with it.
 
-    jobs: worker processes; 1 works in this one.  ray: "local" for a cluster of `jobs` workers on this machine, or the
-    address of a running one, whose machines share `folder`.  progress: a bar over frames.
-    Errors: InputError if the folder holds anything else, or another run is at work in it.
+    Args:
+        plan: of the dataset.
+        folder: made if needed.
+        jobs: worker processes; 1 works in this one.
+        ray: "local" for a cluster of `jobs` workers on this machine, or the address of a running one, whose machines
+            share `folder`.
+        progress: whether a bar over frames is shown.
 
-    >>> plan = Plan("mine", (Entry("train/disk.h5", "disk", 0, 0),), shape=(8, 16), frames=100)
-    >>> built = build(plan, "small")
-    >>> built.made, built.kept
-    (1, 0)
+    Raises:
+        InputError: if the folder holds anything else, or another run is at work in it.
+
+    Example:
+        >>> plan = Plan("mine", (PlannedScene("train/disk.h5", "disk", 0, 0),), shape=(8, 16), frames=100)
+        >>> built = build(plan, "small")
+        >>> built.made, built.kept
+        (1, 0)
     """
     checked_count(jobs, "jobs")
     target = Path(os.path.realpath(folder))
     with run_folder(target, "a dataset"), when_stopped(partial(clear_unfinished, target)):
         plan = _with_renderer(plan, target)
-        manifest = _begun(plan, target)
+        manifest = _manifest_of(plan, target)
         clear_unfinished(target)
         _check_room(plan, target, manifest)
         with _workers(jobs, ray) as at_work:
@@ -80,26 +94,27 @@ def build(plan: Plan, folder: str | Path, *, jobs: int = 1, ray: str | None = No
 
 
 def _with_renderer(plan: Plan, folder: Path) -> Plan:
-    """The back-end that the dataset was begun with, else the best there is, where the choice is ours."""
+    """The plan with a back-end: where none is named, that of the dataset, or for a new one the best of this machine."""
     if plan.renderer != AUTO:
         return plan
-    begun = (folder / NAME).exists()
-    return replace(plan, renderer=Manifest.read(folder).settings["renderer"] if begun else first_that_works())
+    exists = (folder / NAME).exists()
+    return replace(plan, renderer=Manifest.read(folder).settings["renderer"] if exists else first_that_works())
 
 
-def _begun(plan: Plan, folder: Path) -> Manifest:
-    asked = Manifest.of(plan)
+def _manifest_of(plan: Plan, folder: Path) -> Manifest:
+    """The manifest in the folder, or a new one; InputError for another dataset's folder."""
+    wanted = Manifest.of(plan)
     if not (folder / NAME).exists():
         if any(not is_unfinished(path) for path in folder.iterdir()):
             raise InputError(f"{folder} is not empty and holds no dataset; choose a new folder")
-        return asked
-    found = Manifest.read(folder)
-    if different := found.differences(asked):
+        return wanted
+    manifest = Manifest.read(folder)
+    if different := manifest.differences(wanted):
         raise InputError(
             f"{folder} holds a dataset with other settings: {', '.join(different)}; "
             "ask for the same to go on with it, or choose another folder"
         )
-    return found.without_lost(folder)
+    return manifest.without_lost(folder)
 
 
 def _missing(plan: Plan, manifest: Manifest) -> tuple[PlannedScene, ...]:
@@ -108,7 +123,7 @@ def _missing(plan: Plan, manifest: Manifest) -> tuple[PlannedScene, ...]:
 
 
 def _check_room(plan: Plan, folder: Path, manifest: Manifest) -> None:
-    """Errors: InputError where the disk has no room for what is to be made: two streams a scene, noisy and clean."""
+    """InputError where the disk has no room for the missing scenes, each of two streams, noisy and clean."""
     scenes = len(_missing(plan, manifest))
     size = 2 * plan.frames * scenes * packed_bytes(plan.shape)
     checked_disk(size, folder, f"{scenes} scenes of {plan.frames} frames")
@@ -116,12 +131,12 @@ def _check_room(plan: Plan, folder: Path, manifest: Manifest) -> None:
 
 def _make_missing(plan: Plan, folder: Path, manifest: Manifest, at_work: AtWork, progress: bool) -> Built:
     missing = _missing(plan, manifest)
-    there = len(plan.entries) - len(missing)
+    kept = len(plan.entries) - len(missing)
     seconds: Counter[str] = Counter()
     processor_s = 0.0
     frames = plan.frames * len(plan.entries)
     bar = tqdm(
-        total=frames, initial=plan.frames * there, desc=plan.kind, unit="frame", leave=False, disable=not progress
+        total=frames, initial=plan.frames * kept, desc=plan.kind, unit="frame", leave=False, disable=not progress
     )
     with bar:
         for news in at_work(plan, folder, missing):
@@ -135,7 +150,7 @@ def _make_missing(plan: Plan, folder: Path, manifest: Manifest, at_work: AtWork,
     return Built(
         plan.renderer,
         len(missing),
-        there,
+        kept,
         sum(file["bytes"] for file in manifest.files),
         dict(seconds),
         processor_s,
@@ -144,7 +159,7 @@ def _make_missing(plan: Plan, folder: Path, manifest: Manifest, at_work: AtWork,
 
 @contextmanager
 def _workers(jobs: int, ray: str | None) -> Iterator[AtWork]:
-    """Who makes files: a Ray cluster, which is connected within the block, or processes, or this one."""
+    """The maker of files: a Ray cluster, which is connected within the block, or processes, or this one."""
     if ray is not None:
         with connected(ray, jobs) as cluster:
             yield partial(on_ray, cluster)

@@ -1,4 +1,4 @@
-"""Recordings with ground truth in the layout of others, so that their networks can be run on our noisy streams.
+"""Recordings with ground truth in the layout of others, for their networks.
 
 A clip is cut out about a frame whose light is known: `frames` frames, the known one in the middle.
 """
@@ -30,15 +30,19 @@ RECORD = "export.json"
 
 @dataclass(frozen=True)
 class Exported:
-    """A clip: split and name, the recording and the frame it is about, its mean light [spikes/frame], the share of its
-    pixels that are brighter than white."""
+    """A clip of an export."""
 
     split: str
+    """"train" or "test"."""
     name: str
     source: str
+    """File name of the recording."""
     frame: int
+    """Frame in its middle."""
     light: float
+    """Mean light [spikes/frame]."""
     cut: float
+    """Share of its pixels that are brighter than white."""
 
 
 def export_spikezoo(
@@ -54,25 +58,32 @@ def export_spikezoo(
 ) -> list[Exported]:
     """Write Spike-Zoo's layout (`datasets.spikezoo`) from recordings (.h5) and folders of datasets.
 
-    out      a new folder, which appears whole: test/ and train/ as a dataset has them, test/ for recordings by
-             themselves, and `export.json`
-    frames   of a clip, odd; the frame of known light is in the middle
-    clips    most from one recording, spread evenly over its frames of known light
-    rate     light [spikes/frame] that is white
-    stream   "spikes", or "clean" for the noise-free twin's
-    Errors: InputError for no source, a recording without truth, or without enough frames about it, an even number of
-    frames, two recordings of one name, and what `write_clip` refuses; WriteError for a folder that is there already.
+    Args:
+        sources: recordings and folders.
+        out: a new folder, which appears whole: test/ and train/ as a dataset has them, test/ for recordings by
+            themselves, and `export.json`.
+        frames: of a clip, odd; the frame of known light is in the middle.
+        clips: most from one recording, spread evenly over its frames of known light.
+        rate: light [spikes/frame] that is white.
+        bits: of a pixel of the picture, 8 or 16.
+        stream: "spikes", or "clean" for the noise-free twin's.
+        progress: whether a bar over recordings is shown.
+
+    Raises:
+        InputError: for no source, an even number of frames, two recordings of one name, and as of `write_clip`; for a
+            recording without truth, or without enough frames about it.
+        WriteError: for a folder that exists already.
     """
     if not sources:
         raise InputError("nothing to export; give folders of datasets or .h5 recordings")
     if checked_count(frames, "frames") % 2 == 0:
         raise InputError(f"frames = {frames}; it must be odd: the frame of known light is in the middle")
     clips = checked_count(clips, "clips")
-    found = [(split, path) for source in sources for split, path in _recordings(Path(source))]
-    distinct((f"{split}/{path.stem}" for split, path in found), "recording")
+    recordings = [(split, path) for source in sources for split, path in _recordings(Path(source))]
+    distinct((f"{split}/{path.stem}" for split, path in recordings), "recording")
     done: list[Exported] = []
     with whole_folder(out) as folder:
-        for split, path in tqdm(found, desc="export", unit="recording", leave=False, disable=not progress):
+        for split, path in tqdm(recordings, desc="export", unit="recording", leave=False, disable=not progress):
             for row, frame in _middles(path, frames, clips):
                 name = f"{path.stem}-{frame}"
                 spikes = read_hdf5(path, first=frame - frames // 2, count=frames, stream=stream)[0]

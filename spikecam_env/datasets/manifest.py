@@ -1,6 +1,6 @@
 """`dataset.json`: a dataset's settings and scenes, with size and SHA-256 of every file that is done.
 
-A file counts only when it is listed here; so a run that was killed goes on with what is not listed.  Nothing in it
+A file counts only when it is listed here; so a run after one that was killed makes the others.  Nothing in it
 says when, where or by how many processes the dataset was made.
 """
 
@@ -38,7 +38,7 @@ _STATE = {"bytes", "sha256"}
 
 
 class _Settings(Declared):
-    """What the scenes of a dataset share, see `Plan`."""
+    """Settings that the scenes of a dataset share, see `Plan`."""
 
     package_version: str
     kind: str
@@ -52,7 +52,7 @@ class _Settings(Declared):
 
 
 class _File(Declared):
-    """An entry of a dataset, see `Entry`; bytes and sha256 are null until its file is done."""
+    """An entry of a dataset, see `PlannedScene`; bytes and sha256 are null until its file is done."""
 
     path: Name
     scene: Name
@@ -76,20 +76,30 @@ class _DatasetFile(Declared):
 
 @dataclass(frozen=True)
 class Manifest:
-    """settings: what the scenes share.  files: one a scene; `bytes` and `sha256` are None until it is done."""
+    """Settings and files of a dataset."""
 
     settings: dict[str, Any]
+    """Settings that the scenes share."""
     files: tuple[dict[str, Any], ...]
+    """One a scene; `bytes` and `sha256` are None until it is done."""
 
     @classmethod
     def of(cls, plan: Plan) -> Manifest:
-        """Of a dataset that is not begun."""
+        """The manifest of a new dataset."""
         settings = {"package_version": __version__, **plan.settings()}
         return cls(settings, tuple({**asdict(entry), "bytes": None, "sha256": None} for entry in plan.entries))
 
     @classmethod
     def read(cls, folder: Path, *, outside: bool = False) -> Manifest:
-        """Raises InputError where there is none, or it is none, or files lie outside of the folder unless `outside`."""
+        """The manifest of a folder.
+
+        Args:
+            folder: of the dataset.
+            outside: whether files may lie outside of the folder.
+
+        Raises:
+            InputError: where it is missing or damaged, or names files outside of the folder.
+        """
         path = folder / NAME
         if not path.is_file():
             raise InputError(f"{folder} is no dataset: there is no {NAME} in it")
@@ -117,22 +127,22 @@ class Manifest:
     def without_lost(self, folder: Path) -> Manifest:
         """Files that have gone, or have another size than when they were done, are not done."""
         lost = {"bytes": None, "sha256": None}
-        return Manifest(self.settings, tuple(f if _is_there(folder, f) else f | lost for f in self.files))
+        return Manifest(self.settings, tuple(f if _is_kept(folder, f) else f | lost for f in self.files))
 
     def differences(self, other: Manifest) -> list[str]:
         """Where settings and scenes differ, as "frames 1000 (asked: 500)"."""
-        ours, theirs = self._asked(), other._asked()
+        ours, theirs = self._wanted(), other._wanted()
         return [
             name if name in ("model", "scenes") else f"{name} {ours.get(name)} (asked: {theirs[name]})"
             for name in theirs
             if ours.get(name) != theirs[name]
         ]
 
-    def _asked(self) -> dict[str, Any]:
+    def _wanted(self) -> dict[str, Any]:
         scenes = [{k: v for k, v in file.items() if k not in _STATE} for file in self.files]
         return {**self.settings, "scenes": scenes}
 
 
-def _is_there(folder: Path, file: dict[str, Any]) -> bool:
+def _is_kept(folder: Path, file: dict[str, Any]) -> bool:
     path = folder / file["path"]
     return file["sha256"] is not None and path.is_file() and path.stat().st_size == file["bytes"]

@@ -1,4 +1,4 @@
-"""What a dataset is to hold.  Every byte of it follows from its plan.
+"""The plan of a dataset, from which every byte of it follows.
 
 SPIFT_N: random scenes to train on, and others to test.  PHM_N: the ten well-designed scenes, to test.
 Source: the paper, section "Datasets": 100 random scenes, 10 well-designed ones; ours are of our own making.
@@ -34,46 +34,48 @@ PHM = ("ball", "cook", "dice", "doll", "fan", "fly", "hand", "jump", "poker", "t
 class PlannedScene:
     """One scene, and the camera it is recorded with.
 
-    path        of its file in the dataset's folder; its first part is the split, "train" or "test"
-    scene       its name in `scenes.catalogue.SCENES`
-    scene_seed  of what the scene leaves to chance
-    unit_seed   of the camera: its fixed pattern, starting phases and temporal noise
-
-    >>> Entry("train/disk.h5", scene="disk", scene_seed=0, unit_seed=7)
-    Entry(path='train/disk.h5', scene='disk', scene_seed=0, unit_seed=7)
+    Example:
+        >>> PlannedScene("train/disk.h5", scene="disk", scene_seed=0, unit_seed=7)
+        PlannedScene(path='train/disk.h5', scene='disk', scene_seed=0, unit_seed=7)
     """
 
     path: str
+    """Path of its file in the dataset's folder; its first part is the split, "train" or "test"."""
     scene: str
+    """Its name in `scenes.catalogue.SCENES`."""
     scene_seed: int
+    """Seed of the scene's own draws."""
     unit_seed: int
+    """Seed of the camera: its fixed pattern, starting phases and temporal noise."""
 
 
 @dataclass(frozen=True)
 class Plan:
-    """A dataset: the scenes, and what they share.
+    """A dataset: the scenes, and their common settings.
 
-    shape          (rows, columns)
-    frames         of each recording
-    truth_every    frames between ground truths, at frames 0, truth_every, ...; 0: none
-    mean_interval  between spikes, over the picture [frames]: the exposure
-    renderer       back-end that draws: one of `scenes.renderers.choose.BACKENDS`, or "auto" for the best there is
-    Errors: InputError for no entries, an unknown scene, and numbers that are not positive.
+    Raises:
+        InputError: for no entries, an unknown scene, and numbers that are not positive.
 
-    >>> plan = Plan("mine", (Entry("train/disk.h5", "disk", 0, 0),), shape=(8, 16), frames=100)
-    >>> [entry.scene for entry in plan.entries], plan.mean_interval
-    (['disk'], 10.0)
+    Example:
+        >>> plan = Plan("mine", (PlannedScene("train/disk.h5", "disk", 0, 0),), shape=(8, 16), frames=100)
+        >>> [entry.scene for entry in plan.entries], plan.mean_interval
+        (['disk'], 10.0)
     """
 
     kind: str
     entries: tuple[PlannedScene, ...]
     shape: tuple[int, int] = (250, 400)
+    """(rows, columns)."""
     frames: int = 1000
+    """Frames of each recording."""
     seed: int = 0
     truth_every: int = 100
+    """Frames between ground truths, at frames 0, truth_every, ...; 0 for none."""
     mean_interval: float = 10.0
+    """Mean interval between spikes, over the picture [frames]: the exposure."""
     model: SensorModel = field(default_factory=SensorModel.preset)
     renderer: str = AUTO
+    """Back-end that draws: one of `scenes.renderers.choose.BACKENDS`, or "auto" for the best of the machine."""
 
     def __post_init__(self) -> None:
         if not self.entries:
@@ -101,7 +103,7 @@ class Plan:
         )
 
     def settings(self) -> dict[str, Any]:
-        """What the scenes share, as plain values."""
+        """Settings that the scenes share, as plain values."""
         return {
             "kind": self.kind,
             "shape": list(self.shape),
@@ -115,12 +117,17 @@ class Plan:
 
 
 def spift_n(*, train: int = 100, test: int = 10, seed: int = 0, **settings: Any) -> Plan:
-    """Random scenes: `train` of them to train on, `test` others.  settings: fields of `Plan`.
+    """Random scenes; each follows from the seed, its split and its number.
 
-    A scene depends on the seed, its split and its number, not on how many there are.
+    Args:
+        train: scenes to train on.
+        test: other scenes, to test.
+        seed: of all scenes.
+        settings: fields of `Plan`.
 
-    >>> [entry.path for entry in spift_n(train=2, test=1).entries]
-    ['train/000.h5', 'train/001.h5', 'test/000.h5']
+    Example:
+        >>> [entry.path for entry in spift_n(train=2, test=1).entries]
+        ['train/000.h5', 'train/001.h5', 'test/000.h5']
     """
     counts = {"train": checked_seed(train, "train", MOST_SCENES), "test": checked_seed(test, "test", MOST_SCENES)}
     checked_seed(seed)
@@ -133,10 +140,16 @@ def spift_n(*, train: int = 100, test: int = 10, seed: int = 0, **settings: Any)
 
 
 def phm_n(*, scenes: tuple[str, ...] = PHM, seed: int = 0, **settings: Any) -> Plan:
-    """Well-designed scenes, each with a camera of its own.  settings: fields of `Plan`.
+    """Well-designed scenes, each with a camera of its own.
 
-    >>> [entry.path for entry in phm_n(scenes=("fan", "train"), frames=100).entries]
-    ['test/fan.h5', 'test/train.h5']
+    Args:
+        scenes: names in the catalogue.
+        seed: of all scenes.
+        settings: fields of `Plan`.
+
+    Example:
+        >>> [entry.path for entry in phm_n(scenes=("fan", "train"), frames=100).entries]
+        ['test/fan.h5', 'test/train.h5']
     """
     checked_seed(seed)
     for name in scenes:

@@ -18,20 +18,27 @@ from multiprocessing.connection import Connection
 from multiprocessing.process import BaseProcess
 from pathlib import Path
 
+import cv2
+
 from spikecam_env.datasets.plan import Plan, PlannedScene
-from spikecam_env.datasets.worker import use_one_thread
 from spikecam_env.datasets.write import Written, write_scene
 from spikecam_env.errors import InputError
 from spikecam_env.stopping import without_interrupts
+from spikecam_env.threads import limit_threads
 
 ATTEMPTS = 3
 """Deaths of workers over one scene before the run gives up."""
 
 
 def on_processes(plan: Plan, folder: Path, entries: tuple[PlannedScene, ...], jobs: int) -> Iterator[Written | int]:
-    """As `write_scene` gives them, of all scenes in any order; a count is negative where frames were lost.
+    """Write scenes in several processes.
 
-    Errors: what a worker raised; InputError if workers keep dying.
+    Yields:
+        Counts and files as of `write_scene`, in any order; a count is negative where frames were lost.
+
+    Raises:
+        InputError: if workers keep dying.
+        Exception: as a worker raised it.
     """
     waiting = deque(entries)
     deaths: dict[str, int] = {}
@@ -63,12 +70,14 @@ def on_processes(plan: Plan, folder: Path, entries: tuple[PlannedScene, ...], jo
 
 @dataclass
 class _Worker:
-    """A process, our end of its pipe, the scene it is at, and how many frames of that are done."""
+    """A process, and the scene it works on."""
 
     process: BaseProcess
     pipe: Connection
+    """Our end of its pipe."""
     entry: PlannedScene
     frames: int = 0
+    """Frames of the scene that are done."""
 
     @classmethod
     def start(cls, plan: Plan, folder: Path, entry: PlannedScene) -> _Worker:
@@ -100,7 +109,7 @@ def _count_death(deaths: dict[str, int], entry: PlannedScene) -> None:
     if deaths[entry.path] == ATTEMPTS:
         raise InputError(
             f"worker processes died {ATTEMPTS} times over {entry.path}, perhaps for want of memory; "
-            "run the same command with fewer jobs: it goes on with what is not done"
+            "run the same command with fewer jobs: it makes the others"
         )
 
 
@@ -118,6 +127,13 @@ def _work(pipe: Connection, plan: Plan, folder: Path) -> None:
         pipe.send(error)
     except Exception:
         pipe.send(RuntimeError(f"a worker failed:\n{traceback.format_exc()}"))
+
+
+def use_one_thread() -> None:
+    """One thread a process, for compiled kernels, pictures and software rendering: the processes share the cores."""
+    limit_threads(1)
+    cv2.setNumThreads(1)
+    os.environ["LP_NUM_THREADS"] = "1"  # of Mesa's software renderer, read when it starts
 
 
 def _end_with_parent() -> None:

@@ -14,7 +14,7 @@ from pathlib import Path
 from types import ModuleType
 
 from spikecam_env.datasets.plan import Plan, PlannedScene
-from spikecam_env.datasets.worker import use_one_thread
+from spikecam_env.datasets.processes import use_one_thread
 from spikecam_env.datasets.write import Written, write_scene
 from spikecam_env.errors import InputError
 
@@ -28,7 +28,7 @@ def on_ray(ray: ModuleType, plan: Plan, folder: Path, entries: tuple[PlannedScen
     """Files as they are done, in any order, and with each its number of frames.
 
     Args:
-        ray: as `connected` gives it, to a cluster where the package is installed.
+        ray: as of `connected`, to a cluster where the package is installed.
         plan: of the dataset.
         folder: storage that all machines of the cluster share.
         entries: scenes to make.
@@ -68,7 +68,7 @@ def _result(ray: ModuleType, reference: object) -> Written:
     except ray.exceptions.RayError as error:
         raise InputError(
             f"the cluster lost a scene {RETRIES + 1} times ({type(error).__name__}); "
-            "run the same command again: it goes on with what is not done"
+            "run the same command again: it makes the others"
         ) from error
     return written
 

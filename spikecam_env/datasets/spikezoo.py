@@ -52,7 +52,8 @@ class Clip:
 def find_clips(folder: str | Path) -> list[Clip]:
     """The clips of a folder that holds spike/ and gt/, or test/ with them, in the order of their names.
 
-    Errors: InputError where there is no such folder, no .dat in it, or a stream without its picture.
+    Raises:
+        InputError: where there is no such folder, no .dat in it, or a stream without its picture.
     """
     root = Path(folder)
     root = root if (root / "spike").is_dir() else root / "test"
@@ -69,9 +70,10 @@ def find_clips(folder: str | Path) -> list[Clip]:
 
 
 def read_clip(clip: Clip) -> tuple[NDArray[np.uint8], NDArray[np.float32]]:
-    """(T, H, W) uint8 spikes, upright, and the (H, W) float32 picture in [0, 1].  The picture gives rows and columns.
+    """Spikes (T, H, W) uint8, upright, and the picture (H, W) in [0, 1], which gives rows and columns.
 
-    Raises InputError as `read_picture` and `load_vidar_dat` do.
+    Raises:
+        InputError: as of `read_picture` and `load_vidar_dat`.
     """
     stored = read_picture(clip.picture).values
     picture = stored if stored.ndim == 2 else stored[..., :3] @ GREY
@@ -82,11 +84,22 @@ def read_clip(clip: Clip) -> tuple[NDArray[np.uint8], NDArray[np.float32]]:
 def write_clip(
     folder: str | Path, name: str, spikes: ArrayLike, light: NDArray[np.floating], rate: float = RATE, bits: Bits = 8
 ) -> float:
-    """Write a clip into spike/ and gt/ of a folder; returns the share of pixels whose light is cut at white.
+    """Write a clip into spike/ and gt/ of a folder.
 
-    spikes: (T, H, W).  light: (H, W) at frame T // 2 [spikes/frame]; `rate` of it is white.
-    Raises InputError for a name that is no file's, a rate out of range (WHITES), and frames of no whole bytes, which
-    Spike-Zoo cannot read.
+    Args:
+        folder: made if needed.
+        name: of the clip.
+        spikes: (T, H, W).
+        light: (H, W) at frame T // 2 [spikes/frame].
+        rate: light that is white [spikes/frame].
+        bits: of a pixel of the picture.
+
+    Returns:
+        Share of pixels whose light is cut at white.
+
+    Raises:
+        InputError: for a name that is no file's, a rate out of range (WHITES), and frames of no whole bytes, which
+            Spike-Zoo cannot read.
     """
     rate = checked_number(rate, "rate", *WHITES, unit="spikes/frame")
     file_name(name, "clip name")

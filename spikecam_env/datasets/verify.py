@@ -16,15 +16,22 @@ from spikecam_env.whole import is_unfinished
 
 
 def verify(folder: str | Path, *, jobs: int = 1, outside: bool = False, progress: bool = False) -> list[str]:
-    """What is wrong with a dataset, a line each; empty where nothing is.
+    """Faults of a dataset, a line each; none for a whole one.
 
-    jobs: files read at a time.  outside: read files that the dataset keeps outside of its folder too.
-    Errors: InputError if the folder holds no dataset, or files outside of it unless `outside`.
+    Args:
+        folder: of the dataset.
+        jobs: files read at a time.
+        outside: read files that the dataset keeps outside of its folder too.
+        progress: whether a bar over bytes is shown.
 
-    >>> plan = Plan("mine", (Entry("train/disk.h5", "disk", 0, 0),), shape=(8, 16), frames=100)
-    >>> built = build(plan, "small")
-    >>> verify("small")
-    []
+    Raises:
+        InputError: if the folder holds no dataset, or files outside of it unless `outside`.
+
+    Example:
+        >>> plan = Plan("mine", (PlannedScene("train/disk.h5", "disk", 0, 0),), shape=(8, 16), frames=100)
+        >>> built = build(plan, "small")
+        >>> verify("small")
+        []
     """
     checked_count(jobs, "jobs")
     target = Path(folder)
@@ -32,8 +39,8 @@ def verify(folder: str | Path, *, jobs: int = 1, outside: bool = False, progress
     total = sum(file["bytes"] or 0 for file in manifest.files)
     bar = tqdm(total=total, desc="verify", unit="B", unit_scale=True, leave=False, disable=not progress)
     with bar, ThreadPoolExecutor(jobs) as readers:
-        found = list(readers.map(partial(_fault, target, bar), manifest.files))
-    return [line for line in found if line] + _foreign(target, {file["path"] for file in manifest.files})
+        faults = list(readers.map(partial(_fault, target, bar), manifest.files))
+    return [line for line in faults if line] + _foreign(target, {file["path"] for file in manifest.files})
 
 
 def _fault(folder: Path, bar: tqdm, file: dict[str, Any]) -> str | None:

@@ -26,18 +26,25 @@ _READ_BYTES = 1 << 20
 
 @dataclass(frozen=True)
 class Written:
-    """A file that is there: its entry, its size, its SHA-256, where the time went [s], and processor time [s]."""
+    """A file that is written."""
 
     entry: PlannedScene
     size: int
+    """Bytes."""
     sha256: str
     seconds: dict[str, float]
+    """Purpose -> time spent [s]."""
     processor_s: float
+    """Processor time [s]."""
 
 
 def write_scene(plan: Plan, entry: PlannedScene, folder: Path) -> Iterator[int | Written]:
-    """Record one entry into `folder`; gives the number of frames done, piece by piece, and at the end the file."""
-    clock, begun = _Clock(), time.process_time()
+    """Record one entry into `folder`.
+
+    Yields:
+        Numbers of frames done, piece by piece, and at the end the file.
+    """
+    clock, began = _Clock(), time.process_time()
     with clock.on("start"):
         scene = plan.scene(entry)
         camera = SpikeSensor(plan.model, plan.shape, entry.unit_seed, engine="auto")
@@ -64,7 +71,7 @@ def write_scene(plan: Plan, entry: PlannedScene, folder: Path) -> Iterator[int |
             yield count
     with clock.on("digest"):
         digest = sha256_of(path)
-    yield Written(entry, path.stat().st_size, digest, clock.seconds, time.process_time() - begun)
+    yield Written(entry, path.stat().st_size, digest, clock.seconds, time.process_time() - began)
 
 
 def truth_frames(every: int, start: int, stop: int) -> range:
@@ -79,7 +86,7 @@ def append_truth(writer: SpikeWriter, scene: Scene, frame: int) -> None:
 
 
 def sha256_of(path: Path, progress: Callable[[int], object] | None = None) -> str:
-    """SHA-256 of a file, in hexadecimal.  progress: called with the bytes read, piece by piece."""
+    """SHA-256 of a file, in hexadecimal; `progress` is called with the numbers of bytes read, piece by piece."""
     digest = hashlib.sha256()
     with path.open("rb") as file:
         while piece := file.read(_READ_BYTES):
@@ -105,13 +112,13 @@ def _truth(scene: Scene, instant: float) -> dict[str, Any]:
 
 
 class _Clock:
-    """Seconds spent, by what they were spent on."""
+    """Purpose -> seconds spent."""
 
     def __init__(self) -> None:
         self.seconds: dict[str, float] = {}
 
     @contextmanager
-    def on(self, what: str) -> Iterator[None]:
+    def on(self, purpose: str) -> Iterator[None]:
         begin = time.perf_counter()
         yield
-        self.seconds[what] = self.seconds.get(what, 0.0) + time.perf_counter() - begin
+        self.seconds[purpose] = self.seconds.get(purpose, 0.0) + time.perf_counter() - begin

@@ -15,15 +15,12 @@ def checked_action(action: Any, count: int, names: str = "") -> list[float]:
     """The numbers of an action, cut to [-1, 1].
 
     Args:
-        action: Numbers (count,): an array, a list, or a torch tensor on the host, with or without gradient.
-        count: How many an action has.
-        names: Of the numbers, for the error's text, e.g. "(pan, tilt)".
-
-    Returns:
-        The numbers as floats.
+        action: numbers (count,): an array, a list, or a torch tensor on the host, with or without gradient.
+        count: numbers of an action.
+        names: of the numbers, for the error's text, e.g. "(pan, tilt)".
 
     Raises:
-        InputError: For anything else: text, another shape, NaN, infinity.
+        InputError: for anything else: text, another shape, NaN, infinity.
 
     Example:
         >>> checked_action([0.5, 3], 2)

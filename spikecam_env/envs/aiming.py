@@ -29,21 +29,22 @@ DrawEpisode = Callable[[np.random.Generator, dict[str, Any]], Episode]
 class AimingEnv(SpikeCameraEnv):
     """An episode (`envs.episode`) before a spike camera.
 
-    Action        the wanted gaze rate, one number an axis in [-1, 1] of `motor.top_px_s`, pan then tilt; after them
-                  the task's further numbers, if it has any.  What the motor makes of it: `envs.motor`.
-    Reward        `reward`: "progress" or "distance", see `envs.task`; OUTCOME more for a success that ends the episode.
-    Terminated    the episode is decided: lost or done (`Episode.end`).
-    Truncated     its last step is over (`Episode.steps` and `beyond`) and it is not decided.
-    Info          target (2,) float64, where it is seen [pixels]; distance_px, from the middle; is_success, the task is
-                  done as things stand; performance, 1 at best, of the episode if it ended here; gaze_rate (2,) float64
-                  [pixels/s]; what `SpikeCameraEnv` has.
+    Action: the wanted gaze rate, one number an axis in [-1, 1] of `motor.top_px_s`, pan then tilt; then the task's
+        further numbers, if it has any. The motor (`envs.motor`) limits the rate and its change.
+    Reward: "progress" or "distance" of `envs.task`; OUTCOME more for a success that ends the episode.
+    End: terminated when the episode is decided, lost or done (`Episode.end`); truncated after its last step
+        (`Episode.steps` and `beyond`).
+    Info: that of `SpikeCameraEnv`, and target (2,) float64, its place in the picture [pixels]; distance_px, from the
+        middle; is_success, the task is done as things stand; performance, 1 at best, of the episode if it ended here;
+        gaze_rate (2,) float64 [pixels/s].
 
-    draw      see `DrawEpisode`
-    reward    "progress" or "distance"
-    rise_s    of the motor, from rest to its top rate [s]
-    axes      2, or 1 for a camera that only pans
-    further   numbers of the action beyond the axes
-    camera    keywords of `SpikeCameraEnv`
+    Args:
+        draw: see `DrawEpisode`.
+        reward: "progress" or "distance".
+        rise_s: time of the motor from rest to its top rate [s].
+        axes: 2, or 1 for a camera that only pans.
+        further: numbers of the action beyond the axes.
+        camera: keywords of `SpikeCameraEnv`.
     """
 
     settles: ClassVar[tuple[str, ...]] = ("make_scene", "judge")
@@ -70,7 +71,7 @@ class AimingEnv(SpikeCameraEnv):
         self._draw_episode = draw
         self._course: StepOutcome | None = None
         self._before: Any = None  # the course as it was a step ago
-        self._bare: Any = None  # the scene as it is, without what an action puts before the camera
+        self._bare: Any = None  # the scene as it is, without the filters of actions
 
     def set_top_rate(self, px_s: float) -> None:
         """Of the gaze [pixels/s]."""
@@ -112,7 +113,9 @@ class AimingEnv(SpikeCameraEnv):
     def opening(self, seed: int, options: dict[str, Any] | None = None) -> StepOutcome:
         """The beginning of the episode that `reset(seed=seed, options=options)` plays; nothing is exposed.
 
-        options: those of the task, without `model` and `light`
+        Args:
+            seed: of the episode.
+            options: of the task, without `model` and `light`.
         """
         return StepOutcome.begin(self._drive, self._draw_episode(np_random(seed)[0], options or {}))
 
@@ -127,7 +130,7 @@ class AimingEnv(SpikeCameraEnv):
         return observation, info | self._of_standing()
 
     def turn(self, action: ArrayLike) -> None:
-        """The motor does what it can; the other numbers go to the episode."""
+        """The motor turns as fast as it can; the other numbers go to the episode."""
         self._before = self.course
         self._course = self.course.after(self._checked_action(action))
         self._scene, self._gaze = self.episode.through(self._bare), self.course.gaze

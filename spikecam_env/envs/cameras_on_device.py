@@ -8,6 +8,7 @@ Where the camera looks, rewards and ends are plain Python on the host: actions g
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -16,15 +17,16 @@ import torch
 from scenes.planes_on_device import planes_on
 from spikecam_env.envs.cameras_on_host import by_place
 from spikecam_env.envs.observations import Blocks, Observation
-from spikecam_env.envs.spike_camera import Each, SpikeCameraEnv
+from spikecam_env.envs.spike_camera import ForEach, SpikeCameraEnv, lights_of
 from spikecam_env.errors import InputError
-from spikecam_env.sensor import Keyframes, SensorModel, SpikeSensorBatch
+from spikecam_env.sensor import SensorModel, SpikeSensorBatch
 
 
 class DeviceCameras:
-    """A batch of cameras, one for each environment, which has a `Seat` in it instead of a sensor.
+    """A batch of cameras, one for each environment, which has a `BatchedCamera` in it instead of a sensor.
 
-    Raises InputError as `SpikeSensorBatch` does: for a device that is not there, and effects from frame to frame.
+    Raises:
+        InputError: as of `SpikeSensorBatch`, for a missing device and for effects from frame to frame.
     """
 
     def __init__(self, envs: Sequence[SpikeCameraEnv], device: str | torch.device) -> None:
@@ -32,7 +34,7 @@ class DeviceCameras:
         self._batch = SpikeSensorBatch([env.model for env in envs], envs[0].shape, [0] * len(envs), device)
         self._new: dict[int, int] = {}  # seeds of those that begin anew with the next block
         for number, env in enumerate(envs):
-            env.take_seat(Seat(self, number, env.model))
+            env.use_sensor(BatchedCamera(self, number, env.model))
 
     @property
     def device(self) -> torch.device:
@@ -47,25 +49,17 @@ class DeviceCameras:
         """A camera's next frame."""
         return 0 if number in self._new else int(self._batch.frame[number])
 
-    def exposed(self, each: Each, numbers: Sequence[int]) -> Blocks:
-        """The next block of some cameras, along the paths that they follow.
-
-        Args:
-            each: calls a function of each number, on the thread of that environment.
-            numbers: all, or some whose episodes begin with this block.
-
-        Returns:
-            Their blocks, in this order.
-        """
+    def exposed(self, each: ForEach, numbers: Sequence[int]) -> Blocks:
+        """The next block of all cameras, or of those whose episodes begin with it; `each` works on their threads."""
         self._check_models()
         envs = [self._envs[n] for n in numbers]
         batch = self._batch_of(numbers)
-        light = self._light(envs, by_place(each, numbers))
+        light = lights_of(envs, partial(planes_on, device=self.device), by_place(each, numbers))
         spikes: Any = batch.step(light, envs[0].frames_per_step)
         if batch is not self._batch:
             self._batch.exchange(numbers, batch)
         for env, own, block in zip(envs, light, spikes, strict=True):
-            env.take(own, block)
+            env.record(own, block)
         return Blocks(spikes, light, envs[0].model.frame_rate_hz)
 
     def returned(self, values: Any) -> Any:
@@ -85,24 +79,15 @@ class DeviceCameras:
         return batch
 
     def _check_models(self) -> None:
-        others = [n for n, env in enumerate(self._envs) if not isinstance(env.sensor, Seat)]
+        others = [n for n, env in enumerate(self._envs) if not isinstance(env.sensor, BatchedCamera)]
         for number in others:  # so that the next reset finds them in the batch
-            self._envs[number].take_seat(Seat(self, number, self._batch.models[number]))
+            self._envs[number].use_sensor(BatchedCamera(self, number, self._batch.models[number]))
         if others:
             raise InputError(f"environment {others[0]} has another model; with a device all episodes keep theirs")
 
-    def _light(self, given: Sequence[SpikeCameraEnv], each: Each) -> list[Keyframes]:
-        envs: Any = given
-        flat = [n for n, env in enumerate(envs) if not env.renders]
-        other = [n for n, env in enumerate(envs) if env.renders]
-        planes = [envs[n].scene.plane(*envs[n].asked) for n in flat]
-        light = dict(zip(flat, planes_on(planes, self.device), strict=True))
-        light |= zip(other, each(lambda n: envs[n].scene.radiance(*envs[n].asked), other), strict=True)
-        return [light[n] for n in range(len(envs))]
 
-
-class Seat:
-    """What an environment knows of its camera in the batch."""
+class BatchedCamera:
+    """A camera of the batch, as its environment uses it."""
 
     def __init__(self, cameras: DeviceCameras, number: int, model: SensorModel) -> None:
         self._cameras, self._number, self.model = cameras, number, model
@@ -118,7 +103,7 @@ class Seat:
 
 
 def check_on_device(law: Observation, render_mode: str | None) -> None:
-    """Raise InputError for an observation that takes no tensors, and for rendered pictures."""
+    """InputError for an observation that takes no tensors, and for rendered pictures."""
     if not law.takes_tensors:
         raise InputError(f"obs is {type(law).__name__}; with a device it may be 'spikes', 'multibinary', 'tfp', 'rate'")
     if render_mode is not None:

@@ -11,30 +11,17 @@ from typing import Any
 import numpy as np
 
 from spikecam_env.envs.observations import Blocks
-from spikecam_env.envs.spike_camera import Each, SpikeCameraEnv, expose
+from spikecam_env.envs.spike_camera import ForEach, SpikeCameraEnv, expose
 
 
 class HostCameras:
-    """The cameras that environments have of their own.
-
-    Args:
-        envs: N.
-        threads: most that are used.
-    """
+    """The cameras that N environments have of their own, on so many threads at most."""
 
     def __init__(self, envs: Sequence[SpikeCameraEnv], threads: int) -> None:
         self._envs, self._threads = envs, threads
 
-    def exposed(self, each: Each, numbers: Sequence[int]) -> Blocks:
-        """The next block of some cameras, along the paths that they follow, in memory of its own.
-
-        Args:
-            each: calls a function of each number, on the thread of that environment.
-            numbers: of the environments.
-
-        Returns:
-            Their blocks, in this order.
-        """
+    def exposed(self, each: ForEach, numbers: Sequence[int]) -> Blocks:
+        """The next block of these cameras, in memory of its own; `each` works on the threads of the environments."""
         envs = [self._envs[n] for n in numbers]
         spikes = np.empty((len(envs), envs[0].frames_per_step, *envs[0].shape), np.uint8)
         expose(envs, outs=list(spikes), threads=self._threads, each=by_place(each, numbers))
@@ -45,16 +32,8 @@ class HostCameras:
         return values
 
 
-def by_place(each: Each, numbers: Sequence[int]) -> Each:
-    """Work of places in a list of environments, on the threads of those.
-
-    Args:
-        each: calls a function of each number, on the thread of that environment.
-        numbers: of the environments in the list.
-
-    Returns:
-        The same of places in the list.
-    """
+def by_place(each: ForEach, numbers: Sequence[int]) -> ForEach:
+    """As `each`, of places in a list of these numbers of environments."""
 
     def of_places(work: Callable[[int], Any], places: Sequence[int]) -> list[Any]:
         place_of = {numbers[place]: place for place in places}

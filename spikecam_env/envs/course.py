@@ -1,7 +1,7 @@
 """An episode without its pictures: where the camera looks, how fast it turns, and how the episode stands.
 
 A course is a value; `after(action)` is the next one, a step later.  The environment (`envs.aiming`) plays courses and
-shows what is seen on the way.  `steps_of` plays them alone: for the oracle, who looks at places only, and for tests.
+shows pictures on the way.  `steps_of` plays them alone: for the oracle, who looks at places only, and for tests.
 """
 
 from __future__ import annotations
@@ -21,18 +21,16 @@ from spikecam_env.envs.task import distance_from_middle
 
 @dataclass(frozen=True)
 class Drive:
-    """What turns the camera, and when.
-
-    motor            of every axis
-    axes             2, or 1 for a camera that only pans
-    frames_per_step  frames from action to action
-    frame_rate_hz    frames a second
-    """
+    """The drive that turns the camera, and the times at which it does."""
 
     motor: Motor
+    """Motor of every axis."""
     axes: int
+    """2, or 1 for a camera that only pans."""
     frames_per_step: int
+    """Frames from action to action."""
     frame_rate_hz: float
+    """Frames a second."""
 
     @property
     def step_s(self) -> float:
@@ -42,20 +40,18 @@ class Drive:
 
 @dataclass(frozen=True, eq=False)
 class StepOutcome:
-    """The end of a step, or of the block that reset exposes.
-
-    drive      of the camera
-    episode    that is played
-    gaze       the camera's path in the step [pixels]
-    rate_px_s  of the gaze in the step, (pan, tilt)
-    standing   of the episode
-    """
+    """The end of a step, or of the block that reset exposes."""
 
     drive: Drive
+    """Drive of the camera."""
     episode: Episode
+    """The episode that is played."""
     gaze: Gaze
+    """Path of the camera in the step [pixels]."""
     rate_px_s: tuple[float, float]
+    """Rate of the gaze in the step, (pan, tilt) [pixels/s]."""
     standing: Standing
+    """Where the episode stands."""
 
     @classmethod
     def begin(cls, drive: Drive, episode: Episode) -> StepOutcome:
@@ -64,7 +60,7 @@ class StepOutcome:
         return cls(drive, episode, gaze, (0.0, 0.0), _standing(episode, gaze, None))
 
     def after(self, action: Sequence[float]) -> StepOutcome:
-        """A step later.  action: axes + further numbers, in [-1, 1]."""
+        """A step later, after an action of axes + further numbers in [-1, 1]."""
         drive, first, top = self.drive, self.standing.frame, self.drive.motor.top_px_s
         stop = first + drive.frames_per_step
         episode = self.episode.acted(tuple(action[drive.axes :]), self.standing, stop)
@@ -107,16 +103,7 @@ class StepOutcome:
 def steps_of(
     course: StepOutcome, act: Callable[[StepOutcome], NDArray[np.float32]], most: int | None = None
 ) -> Iterator[StepOutcome]:
-    """The courses after each step, up to the one that is over.
-
-    Args:
-        course: The episode's beginning.
-        act: Gives the next action.
-        most: Steps at most; by default `Episode.steps`.
-
-    Returns:
-        An iterator over the courses.
-    """
+    """The courses after each step, up to the one that is over, or `most` steps (default `Episode.steps`)."""
     last = course.episode.steps if most is None else most
     while not (course.terminated or course.truncated) and course.standing.step < last:
         course = course.after(np.clip(act(course), -1.0, 1.0).tolist())

@@ -2,7 +2,7 @@
 
 `Episode` is the plain case: follow one thing for so many steps, and lose it when it leaves the picture.  A task with
 another end overrides `end` and `performance`; one whose action does more than turn the camera overrides `acted` and
-`rest`, and `through` where that changes the light.  An episode is a value: what an action changes is a new one.
+`rest`, and `through` where that changes the light.  An episode is a value: an action makes a new one.
 """
 
 from __future__ import annotations
@@ -15,24 +15,22 @@ from spikecam_env.envs.task import closeness, is_inside
 
 @dataclass(frozen=True)
 class Standing:
-    """Where an episode stands at the end of a step.
-
-    frame       the sensor's
-    step        steps so far; 0 after reset
-    place       (x, y) where the target is seen [pixels]
-    distance_px of it from the middle
-    on_target   whether the episode counts this as being on it
-    steps_on    steps so far that ended on it
-    held        steps in a row, up to this one, that ended on it
-    """
+    """Where an episode stands at the end of a step."""
 
     frame: int
+    """Frame of the sensor."""
     step: int
+    """Steps so far; 0 after reset."""
     place: tuple[float, float]
+    """(x, y) at which the target appears [pixels]."""
     distance_px: float
+    """Distance of the target from the middle [pixels]."""
     on_target: bool
+    """Whether the episode counts this as being on the target."""
     steps_on: int
+    """Steps so far that ended on the target."""
     held: int
+    """Steps in a row, up to this one, that ended on the target."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,11 +59,11 @@ class Episode:
         return distance_px <= self.success_px
 
     def worth(self, standing: Standing) -> float:
-        """How good things are, 1 at best: what the rewards of `envs.task` are made of."""
+        """How good things are, 1 at best; the rewards of `envs.task` are made of it."""
         return closeness(standing.distance_px, self.scene.shape)
 
     def end(self, standing: Standing) -> bool | None:
-        """None: it goes on.  Over otherwise: True where that is a success, False where it is a failure."""
+        """None while the episode goes on; at its end True for a success, False for a failure."""
         return None if is_inside(standing.place, self.scene.shape) else False
 
     def is_success(self, standing: Standing) -> bool:
@@ -80,14 +78,14 @@ class Episode:
         """The episode after an action.
 
         Args:
-            rest: The action's further numbers, in [-1, 1].
-            standing: At the beginning of the step.
-            stop: Frame of the step's end.
+            rest: further numbers of the action, in [-1, 1].
+            standing: at the beginning of the step.
+            stop: frame at which the step ends.
         """
         return self
 
     def through(self, scene: Scene) -> Scene:
-        """The scene as the camera sees it through what actions have set; after reset it sees the scene itself."""
+        """The scene behind the filters that actions have set; after reset the camera sees the scene itself."""
         return scene
 
     def rest(self, standing: Standing, first: int, stop: int) -> tuple[float, ...]:

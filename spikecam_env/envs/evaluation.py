@@ -1,12 +1,12 @@
-"""What a policy reached on test episodes, and how sure that is.
+"""The score of a policy on test episodes, and its interval.
 
     score = (performance - nothing's) / (oracle's - nothing's)
 
 The interval covers the score of all episodes of the split in 95 of 100 evaluations.
 
 - If every performance is 0 or 1 (Catch, Saccade), it is Wilson's interval of their mean, scaled as the score is.
-- Otherwise it is a paired bootstrap: episodes are drawn with replacement, each with what the policy, nothing and the
-  oracle reached on it, and the score is computed anew.
+- Otherwise it is a paired bootstrap.  Episodes are drawn with replacement, each with the performances of the policy, of
+  nothing and of the oracle, and the score is computed anew.
 
 Sources: Wilson, JASA 22 (1927); Efron and Tibshirani, "An Introduction to the Bootstrap" (1993), chapter 13.
 """
@@ -75,37 +75,14 @@ class Evaluation:
         success: float,
         returns: float,
     ) -> Evaluation:
-        """The evaluation of episodes.
-
-        Args:
-            task: Id of the task.
-            performances: The policy's performance in each episode.
-            nothing: That of doing nothing, in the same episodes.
-            oracle: The oracle's, in the same episodes.
-            success: Share of episodes that end in success.
-            returns: Mean sum of rewards.
-
-        Returns:
-            The score with its interval.
-        """
-        reached, still, best = (np.asarray(each, float) for each in (performances, nothing, oracle))
+        """The evaluation of episodes, from the performances of policy, nothing and oracle in each."""
+        reached, still, best = (np.asarray(one, float) for one in (performances, nothing, oracle))
         mean, low_end, high_end = float(reached.mean()), float(still.mean()), float(best.mean())
         method = "Wilson" if np.isin(reached, (0.0, 1.0)).all() else "bootstrap"
         interval = _wilson if method == "Wilson" else _bootstrap
         low, high = interval(reached, still, best)
-        return cls(
-            task,
-            score(mean, low_end, high_end),
-            low,
-            high,
-            method,
-            mean,
-            low_end,
-            high_end,
-            success,
-            returns,
-            tuple(reached.tolist()),
-        )
+        of_policy, each = score(mean, low_end, high_end), tuple(reached.tolist())
+        return cls(task, of_policy, low, high, method, mean, low_end, high_end, success, returns, each)
 
     def __str__(self) -> str:
         count = len(self.performances)

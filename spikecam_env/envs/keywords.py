@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import fields
-from importlib import import_module
 from inspect import Parameter, signature
-from typing import Any
+from pkgutil import resolve_name
 
+from spikecam_env.envs.registration import HINTS_ABOVE
 from spikecam_env.errors import InputError, unknown_name
 
 OF_GYMNASIUM = ("max_episode_steps", "disable_env_checker", "num_envs", "vectorization_mode")
@@ -22,29 +21,29 @@ def keywords_of(kind: type) -> list[str]:
         >>> "split" in keywords_of(TaskEnv), "frames_per_step" in keywords_of(TaskEnv), "axes" in keywords_of(TaskEnv)
         (True, True, False)
     """
-    found: dict[str, None] = {}
+    names: dict[str, None] = {}
     settled: set[str] = set()
-    for number, each in enumerate(kind.__mro__):
-        if "__init__" not in vars(each):
+    for number, parent in enumerate(kind.__mro__):
+        if "__init__" not in vars(parent):
             continue
-        parameters = list(signature(vars(each)["__init__"]).parameters.values())[1:]
+        parameters = list(signature(vars(parent)["__init__"]).parameters.values())[1:]
         own = [p.name for p in parameters if p.kind is Parameter.KEYWORD_ONLY or (number == 0 and _is_named(p))]
-        found |= dict.fromkeys(name for name in own if name not in settled)
-        settled |= set(getattr(each, "settles", ()))
+        names |= dict.fromkeys(name for name in own if name not in settled)
+        settled |= set(getattr(parent, "settles", ()))
         if not any(p.kind is Parameter.VAR_KEYWORD for p in parameters):
             break
-    return [name for name in found if name != "unknown"]
+    return [name for name in names if name != "unknown"]
 
 
 def check_keywords(kind: type, given: Iterable[str]) -> None:
-    """Raise InputError for keywords that a class of environments does not take.
+    """Refuse keywords that a class of environments does not take.
 
     Args:
-        kind: The class.
-        given: Names that its constructor could not use.
+        kind: the class.
+        given: names that its constructor could not use.
 
     Raises:
-        InputError: For the first name: whose it is instead, or the nearest that exists.
+        InputError: for the first name, with its owner or the nearest name that exists.
 
     Example:
         >>> from spikecam_env.envs.tasks.env import TaskEnv
@@ -67,7 +66,7 @@ def check_settled(kind: type, given: Iterable[str]) -> None:
 
 
 def _settled(kind: type) -> set[str]:
-    return {name for each in kind.__mro__ for name in getattr(each, "settles", ())}
+    return {name for parent in kind.__mro__ for name in getattr(parent, "settles", ())}
 
 
 def _is_named(parameter: Parameter) -> bool:
@@ -75,26 +74,8 @@ def _is_named(parameter: Parameter) -> bool:
 
 
 def _elsewhere(kind: type, name: str) -> str:
-    """Whose the keyword is, if it is another's; else nothing."""
+    """The owner of the keyword, if it has another one; else nothing."""
     if name in OF_GYMNASIUM:
         return "it is of gymnasium.make and gymnasium.make_vec, which take it themselves"
-    if name in _of_vectors():
-        return 'it is of vector environments: gymnasium.make_vec(id, vectorization_mode="vector_entry_point", ...)'
-    if name in _settled(kind):
-        return f"{kind.__name__} sets it itself"
-    tasks: dict[str, Any] = import_module("spikecam_env.envs.tasks").TASKS
-    of = [task for task, its in tasks.items() if name in (field.name for field in fields(its))]
-    if of:
-        return (
-            f"it is a number of tasks ({', '.join(of)}): TaskEnv({of[0]}({name}=...)), or make(id, task={of[0]}(...))"
-        )
-    return ""
-
-
-def _of_vectors() -> set[str]:
-    """Keywords of vector environments alone."""
-    vector = import_module("spikecam_env.envs.vector").SpikeCameraVectorEnv
-    single = import_module("spikecam_env.envs.spike_camera").SpikeCameraEnv
-    return (
-        set(signature(vector.__init__).parameters) - set(signature(single.__init__).parameters) - {"single", "options"}
-    )
+    of_vectors, of_tasks = (resolve_name(place)(name) for place in HINTS_ABOVE)
+    return of_vectors or (f"{kind.__name__} sets it itself" if name in _settled(kind) else of_tasks)

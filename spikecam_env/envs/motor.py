@@ -16,10 +16,12 @@ from spikecam_env.checked import checked_number
 
 @dataclass(frozen=True)
 class Motor:
-    """top_px_s: fastest rate of an axis [pixels/s]; rise_s: time from rest to it [s]."""
+    """The motor of an axis."""
 
     top_px_s: float
+    """Fastest rate of an axis [pixels/s]."""
     rise_s: float = 0.0
+    """Time from rest to the fastest rate [s]."""
 
     def __post_init__(self) -> None:
         checked_number(self.top_px_s, "max_gaze_rate_px_s", 0.0, above=True)
@@ -42,7 +44,14 @@ def cut(value: float, most: float) -> float:
 
 
 def turned(start: tuple[float, float], rates: Sequence[float], top: float, frames: tuple[int, int]) -> Gaze:
-    """The path of a gaze.  rates: (pan, tilt) in units of `top` [pixels/frame], cut to [-1, 1] as a motor saturates."""
+    """The path of a gaze that turns at one rate.
+
+    Args:
+        start: (pan, tilt) [pixels].
+        rates: (pan, tilt) in units of `top`, cut to [-1, 1] as a motor saturates.
+        top: [pixels/frame].
+        frames: first frame, and the frame after the last.
+    """
     count = frames[1] - frames[0]
     pan, tilt = (place + cut(rate, 1.0) * top * count for place, rate in zip(start, rates, strict=True))
     return Gaze(start, (pan, tilt), (float(frames[0]), float(frames[1])))

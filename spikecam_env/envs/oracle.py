@@ -1,8 +1,8 @@
 """An agent that knows the true state and obeys the same motor: the upper end of every score.
 
-Where the target is, and how it moves in the next step, is known; what it does after that is not looked at.  With
-u, the target's motion in the step, e, its distance from the middle now, and a, the most the gaze's motion changes from
-step to step, the gaze moves by
+The oracle knows where the target is and how it moves in the next step, and does not look further ahead.  Let u be the
+target's motion in the step, and e its distance from the middle now.  The gaze's motion changes by a at most from step
+to step.  The gaze then moves by
 
     u + w,   |w| = min(|e|, 4 |e| / (1 + sqrt(1 + 8 |e| / a)))       [pixels/step]
 

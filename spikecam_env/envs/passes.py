@@ -1,4 +1,4 @@
-"""When a scene starts over, so that what was followed is elsewhere at once: a ball is thrown again, a train is back.
+"""When a scene starts over, and its target is elsewhere at once: a ball is thrown again, a train is back.
 
 A follower that knows everything looks at the target, and goes on as the target does; where the target is then out of
 its picture, nothing that turns could have followed.
@@ -15,16 +15,18 @@ from scenes.protocol import Gaze, Placed
 from spikecam_env.envs.task import is_inside
 
 EVERY_S = 0.005
-"""From look to look [s].  What vibrates at 40 Hz and 80 shorter sides a second, the fastest of random worlds, leaves a
-straight line by a quarter of a side in it; a scene that starts over leaps by more than one."""
+"""From look to look [s].  The fastest body of random worlds vibrates at 40 Hz and 80 shorter sides a second: it leaves
+a straight line by a quarter of a side in this time.  A scene that starts over leaps by more than a side."""
 
 
 @dataclass(frozen=True)
 class Passes:
-    """top_px_s: the target's top speed [pixels/s]; cuts: frames by which the scene is about to start over, rising."""
+    """The stretches in which a target can be followed."""
 
     top_px_s: float
+    """Top speed of the target [pixels/s]."""
     cuts: NDArray[np.int64]
+    """Frames by which the scene is about to start over, rising."""
 
     def end(self, frame: int) -> float:
         """Last frame of the pass that `frame` lies in; infinite where none ends after it."""
@@ -33,31 +35,28 @@ class Passes:
 
 
 def passes(scene: Placed, target: str, last: int, cuts_to: int | None = None) -> Passes:
-    """Passes of a target.
+    """Passes of a target from frame 0 on.
 
     Args:
-        scene: Shows the target.
-        target: Its name.
-        last: Last frame of which the top speed counts.
-        cuts_to: Last frame at which the scene may start over; by default `last`.
-
-    Returns:
-        The passes from frame 0 on.
+        scene: shows the target.
+        target: its name.
+        last: last frame of which the top speed counts.
+        cuts_to: last frame at which the scene may start over; by default `last`.
     """
     every = max(1, round(EVERY_S * scene.frame_rate_hz))
     rows, columns = scene.shape
     middle = np.array([(columns - 1) / 2, (rows - 1) / 2])
 
-    def seen(frame: float, gaze: NDArray[np.float64]) -> NDArray[np.float64]:
+    def place_at(frame: float, gaze: NDArray[np.float64]) -> NDArray[np.float64]:
         return np.array(scene.places(frame, Gaze.fixed(float(gaze[0]), float(gaze[1])))[target])
 
     gaze, speeds, cuts = np.zeros(2), [], []
     for frame in range(0, max(last, cuts_to or 0) + every, every):
-        place = seen(frame, gaze)
+        place = place_at(frame, gaze)
         if frame and not is_inside((place[0], place[1]), scene.shape):
             cuts.append(frame - every)
         gaze = gaze + place - middle
-        velocity = _slower(seen(frame + 0.5, gaze) - middle, seen(frame + 1, gaze) - middle)
+        velocity = _slower(place_at(frame + 0.5, gaze) - middle, place_at(frame + 1, gaze) - middle)
         if frame < last + every:
             speeds.append(float(np.hypot(*velocity)))
         gaze = gaze + every * velocity

@@ -36,7 +36,7 @@ ENVIRONMENTS: dict[str, tuple[str, dict[str, Any]]] = {
     "spikecam_env/RotatingDisk-v0": ("spikecam_env.envs.rotating_disk:RotatingDiskEnv", {}),
     "spikecam_env/Scene-v0": (SCENE, {}),
 } | {f"spikecam_env/{name}-v0": (SCENE, {"scene": name.lower()}) for name in NAMED}
-"""Id -> where its class is, and what it is made with.  `Scene-v0` is a random world, or what `scene=` says."""
+"""Id -> place of its class, and keywords.  `Scene-v0` is a random world, or the one that `scene=` names."""
 
 MAX_EPISODE_STEPS = 500
 """Half a second at 40 frames a step and 40 kHz."""
@@ -57,18 +57,26 @@ environment that was made has the right `max_episode_steps`, and the registered 
 
 SMALL_TASKS = tuple(name for name in TASK_ENVIRONMENTS if "-Full" not in name)
 
+OBSERVATIONS_ABOVE: dict[str, tuple[str, dict[str, Any]]] = {}
+"""Observations of packages above the environments: name -> place of its class, and keywords.  `spikecam_env` fills it
+when it is imported, as the root of the house knows both."""
+
+HINTS_ABOVE = ("spikecam_env.envs.vector:whose_keyword", "spikecam_env.envs.tasks:whose_number")
+"""Functions that say whose an unknown keyword of an environment is: `keywords` asks them in this order."""
+
 
 def register() -> None:
     """Register every id that is not registered yet, each with the native vector environment of its class.
 
-    >>> import gymnasium
-    >>> register()
-    >>> "spikecam_env/Track-v1" in gymnasium.registry
-    True
+    Example:
+        >>> import gymnasium
+        >>> register()
+        >>> "spikecam_env/Track-v1" in gymnasium.registry
+        True
     """
     for name, (entry_point, options) in (ENVIRONMENTS | TASK_ENVIRONMENTS).items():
         if name not in gymnasium.registry:
-            vector = f"spikecam_env.envs.vector_of:{entry_point.replace(':', '.')}"
+            vector = f"spikecam_env.envs.vector:{entry_point.replace(':', '.')}"
             is_scene = name in ENVIRONMENTS
             steps, given = (MAX_EPISODE_STEPS, {**options, "steps": None}) if is_scene else (None, options)
             gymnasium.register(name, entry_point, max_episode_steps=steps, kwargs=given, vector_entry_point=vector)

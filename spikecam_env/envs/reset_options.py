@@ -26,14 +26,11 @@ def checked_options(options: Any, rules: Mapping[str, Rule]) -> dict[str, Any]:
     """Options by name, each checked by its rule.
 
     Args:
-        options: A dictionary, or None for no options.
-        rules: The options that this environment knows.
-
-    Returns:
-        The checked values of those that were given.
+        options: a dictionary, or None for no options.
+        rules: of the options that this environment knows.
 
     Raises:
-        InputError: For an unknown name, an unusable value, and for options that are no dictionary.
+        InputError: for an unknown name, an unusable value, and for options that are no dictionary.
 
     Example:
         >>> checked_options({"offset": [1, 2]}, {"offset": pair})
@@ -47,7 +44,11 @@ def checked_options(options: Any, rules: Mapping[str, Rule]) -> dict[str, Any]:
 
 
 def as_dictionary(options: Any, name: str = "options") -> dict[str, Any]:
-    """A copy of the options; raises InputError unless they are None or a dictionary by name."""
+    """A copy of the options.
+
+    Raises:
+        InputError: unless they are None or a dictionary by name.
+    """
     if options is None:
         return {}
     if not isinstance(options, Mapping) or not all(isinstance(key, str) for key in options):

@@ -25,19 +25,22 @@ class RotatingDiskEnv(AimingEnv):
     terminates when the disk's centre leaves the picture.  On the target: within an eighth of the shorter side.
     `gymnasium.make` truncates it after 500 steps (0.5 s at 40 frames a step), or after its `max_episode_steps`.
 
-    start_offset_px   most the disk starts off the middle; default a quarter of the shorter side
-    drift_px_s        most it drifts; default 0.8 of the shorter side a second
-    shape, rpm, radius, light, texture, background, texture_seed: as `scenes.RotatingDisk` has them
-    steps             after which the class itself truncates an episode; None, as the ids have it: it never does
-    camera            keywords of `AimingEnv` and `SpikeCameraEnv`: reward, model, frames_per_step, ground_truth, ...
+    Options: centre (x, y) [pixels], drift_px_s (x, y), angle [radians]; the others are drawn.
 
-    Options of reset: centre (x, y) [pixels], drift_px_s (x, y), angle [radians] fix what is drawn otherwise.
+    The arguments shape, rpm, radius, light, texture, background and texture_seed are those of `scenes.RotatingDisk`.
 
-    >>> env = RotatingDiskEnv(shape=(16, 24))
-    >>> spikes, info = env.reset(seed=0)
-    >>> spikes, reward, terminated, truncated, info = env.step(np.array([0.2, 0.0]))
-    >>> spikes.shape, spikes.dtype
-    ((40, 16, 24), dtype('int8'))
+    Args:
+        start_offset_px: most the disk starts off the middle; default a quarter of the shorter side.
+        drift_px_s: most it drifts; default 0.8 of the shorter side a second.
+        steps: after which the class itself truncates an episode; None, as the ids have it: it never does.
+        camera: keywords of `AimingEnv` and `SpikeCameraEnv`: reward, model, frames_per_step, ground_truth, ...
+
+    Example:
+        >>> env = RotatingDiskEnv(shape=(16, 24))
+        >>> spikes, info = env.reset(seed=0)
+        >>> spikes, reward, terminated, truncated, info = env.step(np.array([0.2, 0.0]))
+        >>> spikes.shape, spikes.dtype
+        ((40, 16, 24), dtype('int8'))
     """
 
     settles: ClassVar[tuple[str, ...]] = ("draw",)

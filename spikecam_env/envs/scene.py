@@ -61,26 +61,30 @@ class SceneEnv(AimingEnv):
     its `max_episode_steps`.  At first the camera, on a mount that drifts slowly, looks past the target by
     `start_offset_px` or half of it.
 
-    scene               a name of `scenes.catalogue.SCENES`; "random" is another world in every episode
-    target              name of what is to be followed (`poses` of the truth has them); default: the first that moves
-                        at FASTEST_TARGET at most; the slowest where none does
-    scene_seed          of a named scene: textures, poses; episodes differ by where and when they start
-    start_offset_px     most the camera looks past the target at first; default a quarter of the shorter side
-    mean_interval       of the exposure [frames]
-    shape               (rows, columns)
-    max_gaze_rate_px_s  default twice the target's top speed, 4 of the shorter side a second at least
-    steps               after which the class itself truncates an episode; None, as the ids have it: it never does
-    camera              keywords of `AimingEnv` and `SpikeCameraEnv`: reward, model, frames_per_step, ground_truth, ...
-
-    Options of reset: start_frame, offset (pan, tilt) [pixels], drift_px_s (pan, tilt) and, of random worlds, seed fix
-    what is drawn otherwise.
+    Options: start_frame, offset (pan, tilt) [pixels], drift_px_s (pan, tilt) and, of random worlds, seed; the others
+        are drawn.
     Info: scene_over, whether the episode is truncated because its scene starts over; the others of `AimingEnv`.
-    Errors: InputError for an unknown scene or target, and for a scene in which nothing moves.
 
-    >>> env = SceneEnv(scene="disk", shape=(16, 24))
-    >>> spikes, info = env.reset(seed=0)
-    >>> spikes.shape, env.action_space.shape
-    ((40, 16, 24), (2,))
+    Args:
+        scene: a name of `scenes.catalogue.SCENES`; "random" is another world in every episode.
+        target: a name in `poses` of the truth; default the first that moves at FASTEST_TARGET at most, or else the
+            slowest.
+        shape: (rows, columns).
+        scene_seed: of a named scene: textures, poses; episodes differ by where and when they start.
+        start_offset_px: most the camera looks past the target at first; default a quarter of the shorter side.
+        mean_interval: of the exposure [frames].
+        max_gaze_rate_px_s: default twice the target's top speed, 4 of the shorter side a second at least.
+        steps: after which the class itself truncates an episode; None, as the ids have it: it never does.
+        camera: keywords of `AimingEnv` and `SpikeCameraEnv`: reward, model, frames_per_step, ground_truth, ...
+
+    Raises:
+        InputError: for an unknown scene or target, and for a scene in which nothing moves.
+
+    Example:
+        >>> env = SceneEnv(scene="disk", shape=(16, 24))
+        >>> spikes, info = env.reset(seed=0)
+        >>> spikes.shape, env.action_space.shape
+        ((40, 16, 24), (2,))
     """
 
     settles: ClassVar[tuple[str, ...]] = ("draw",)
@@ -125,7 +129,7 @@ class SceneEnv(AimingEnv):
         super().close()
 
     def _build(self, seed: int) -> Placed:
-        """The scene of this seed, not yet exposed; raises InputError where there is nothing to follow in it."""
+        """The scene of this seed, not yet exposed; InputError where there is nothing to follow in it."""
         return _followed(self.scene_name, self.target, self.shape, seed, self.model.frame_rate_hz)
 
     def _draw(self, rng: np.random.Generator, options: dict[str, Any]) -> Episode:
@@ -209,10 +213,10 @@ def _followable(
     Kept, since environments of a kind are made in numbers, and a scene of many bodies takes a second.
     """
     scene = _followed(name, target, shape, seed, frame_rate_hz)
-    found: dict[str, Passes] = {}
-    for each in scene.places(0.0) if target is None else (target,):
-        found[each] = passes(scene, each, last, max(last, CUTS_KNOWN))
-        if found[each].top_px_s <= FASTEST_TARGET * min(shape):
-            return each, found[each]
-    slowest = min(found, key=lambda each: found[each].top_px_s)
-    return slowest, found[slowest]
+    by_name: dict[str, Passes] = {}
+    for one in scene.places(0.0) if target is None else (target,):
+        by_name[one] = passes(scene, one, last, max(last, CUTS_KNOWN))
+        if by_name[one].top_px_s <= FASTEST_TARGET * min(shape):
+            return one, by_name[one]
+    slowest = min(by_name, key=lambda one: by_name[one].top_px_s)
+    return slowest, by_name[slowest]

@@ -48,40 +48,35 @@ BASELINES: dict[str, Policy] = {"oracle": act_oracle, "nothing": act_nothing, "r
 
 @dataclass(frozen=True)
 class Played:
-    """Means over episodes, and the performance in each.
-
-    returns      undiscounted sum of rewards
-    performance  `info["performance"]` at the end, 0 to 1
-    success      share of episodes with `info["is_success"]` at the end
-    distance_px  over all steps
-    ms_a_step    of the environment alone [ms]
-    steps        an episode
-    performances in each episode
-    """
+    """Means over episodes, and the performance in each."""
 
     returns: float
+    """Undiscounted sum of rewards."""
     performance: float
+    """`info["performance"]` at the end, 0 to 1."""
     success: float
+    """Share of episodes with `info["is_success"]` at the end."""
     distance_px: float
+    """Distance from the target over all steps [pixels]."""
     ms_a_step: float
+    """Time of a step in the environment alone [ms]."""
     steps: float
+    """Steps of an episode."""
     performances: tuple[float, ...]
+    """Performance in each episode."""
 
 
 def play(env: gymnasium.Env[Any, Any], policy: Policy, seeds: Iterable[int], progress: bool | None = False) -> Played:
-    """A policy's episodes.
+    """Play a policy's episodes, one a seed.
 
     Args:
-        env: Of an id of this package, wrapped or not.
-        policy: Gives the actions.
-        seeds: One an episode.
-        progress: Whether a bar is shown; None: in a terminal.
-
-    Returns:
-        Means over the episodes.
+        env: of an id of this package, wrapped or not.
+        policy: gives the actions.
+        seeds: of the episodes.
+        progress: whether a bar is shown; None: in a terminal.
 
     Raises:
-        InputError: For an environment without a performance.
+        InputError: for an environment without a performance.
     """
     inner = _aiming(env)
     bar = tqdm(seeds, desc="episodes", unit="episode", leave=False, disable=None if progress is None else not progress)
@@ -99,7 +94,7 @@ def play(env: gymnasium.Env[Any, Any], policy: Policy, seeds: Iterable[int], pro
 
 
 def _aiming(env: gymnasium.Env[Any, Any]) -> AimingEnv:
-    """The environment of this package below all wrappers; raises InputError where there is none."""
+    """The environment of this package below all wrappers; InputError where there is none."""
     inner = env.unwrapped
     if not isinstance(inner, AimingEnv):
         raise InputError(f"{type(inner).__name__} is no AimingEnv and has no performance; take an id of this package")
@@ -116,18 +111,14 @@ def ends(env: gymnasium.Env[Any, Any], seeds: Sequence[int]) -> tuple[list[float
 
     They look at no pictures, so that no camera is exposed (`envs.course`).
 
-    Args:
-        env: As of `play`.
-        seeds: One an episode.
-
     Returns:
         (nothing's, the oracle's), of each episode.
     """
     inner = _aiming(env)
     still = np.zeros(inner.action_space.shape or (), np.float32)
     most = None if env.spec is None else env.spec.max_episode_steps
-    begun = [inner.opening(seed) for seed in seeds]
-    nothing, best = ([_end(course, act, most) for course in begun] for act in (lambda _: still, oracle))
+    first = [inner.opening(seed) for seed in seeds]
+    nothing, best = ([_end(course, act, most) for course in first] for act in (lambda _: still, oracle))
     return nothing, best
 
 
@@ -159,9 +150,16 @@ def baselines(
 ) -> list[dict[str, Any]]:
     """The baselines of every id, on the episodes of seeds `seed`, `seed` + 1, ...; test episodes where an id has them.
 
-    options  keywords of every environment, e.g. shape
-    A row an id: task, the oracle's performance, return and success, nothing's performance, return and success, the
-    score of random actions, mean distances of the oracle and of nothing [pixels], milliseconds a step.
+    Args:
+        ids: of the environments.
+        episodes: of each id.
+        seed: of the first episode.
+        progress: whether a bar is shown.
+        options: keywords of every environment, e.g. shape.
+
+    Returns:
+        A row an id: task, performance, return and success of the oracle and of doing nothing, the score of random
+        actions, mean distances of the oracle and of nothing [pixels], milliseconds a step.
     """
     return [_row(name, range(seed, seed + episodes), options) for name in tqdm(ids, unit="task", disable=not progress)]
 

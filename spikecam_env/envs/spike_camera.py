@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from functools import partial
 from math import isfinite
 from os import PathLike
 from typing import Any, ClassVar, TypeVar
@@ -13,7 +14,7 @@ from gymnasium import spaces
 from numpy.typing import ArrayLike, NDArray
 
 from scenes.exposure import lit
-from scenes.planes import PlanarScene, painted_planes
+from scenes.planes import PlanarScene, Plane, painted_planes
 from scenes.protocol import MOST_LIGHT, Gaze, Scene
 from scenes.renderers.shared import register_user, release_user
 from spikecam_env.checked import (
@@ -39,8 +40,10 @@ Judge = Callable[[Any, float, Gaze], tuple[float, bool]]
 """(scene, frame, gaze) at the end of a step -> (reward, terminated)."""
 
 T = TypeVar("T")
-Each = Callable[[Callable[[int], Any], Sequence[int]], list[Any]]
-"""(work, numbers) -> what work of each number returns."""
+ForEach = Callable[[Callable[[int], Any], Sequence[int]], list[Any]]
+"""(work, numbers) -> the results of work, one a number."""
+Paint = Callable[[list[Plane]], list[Keyframes]]
+"""Planes -> the light of each, on the processor or on a device."""
 
 
 def in_turn(work: Callable[[int], T], numbers: Sequence[int]) -> list[T]:
@@ -55,36 +58,42 @@ RENDER_FRAMES = 40
 class SpikeCameraEnv(gymnasium.Env[Any, NDArray[np.float32]]):
     """Each step exposes `frames_per_step` spike frames while the camera turns at the rate the action gives.
 
-    Observation   what `obs` names; a fresh array each step.  By default "spikes", the step's frames, (K, H, W) int8 of
-                  0 and 1.  With `obs_state` a Dict: picture, gaze, age (`observations.with_state_space`).
-    Action        (2,) float32, gaze rate (pan, tilt) in [-1, 1] of `max_gaze_rate_px_s`; pan is to the right,
-                  tilt is down.  Values beyond are cut, as a motor saturates.
-    Reward, end   from `judge`.
-    Reset         draws the scene and the camera's unit (fixed pattern, phases, noise) from `np_random`, then
-                  exposes the first K frames with the camera at rest.  Same seed, same actions: same bits.
-                  Options for this episode: `model` (as below, of the same frame rate), `light`, a factor on the
-                  scene's light; the others are the scene's.
-    Info          time_s, frame (end of the block), gaze (2,) float64 [pixels] there, age [frames] of the picture
-                  (-1: none is valid yet); with `ground_truth` also radiance, flow, object_id at the centre of the
-                  block and poses, see `scenes.protocol.Truth`.
-    Render        `rgb_array`: the share of frames with a spike, over the last blocks of RENDER_FRAMES or more;
-                  white is a spike every frame, gamma 2.2.
-
-    make_scene           see `MakeScene`; its scenes have this `shape` and the model's frame rate
-    judge                see `Judge`
-    shape                (rows, columns)
-    model                a preset's name, a TOML path or a SensorModel
-    frames_per_step      K: the control rate is frame rate / K
-    max_gaze_rate_px_s   default 4 of the shorter side a second
-    obs                  a name of `observations.OBSERVATIONS` or an `Observation`; default `usual_obs` of the class;
-                         packed=True is obs="packed"
-    engine, threads      of the sensor: "auto", "fast" or "reference"; as `SpikeSensor` has them
-
     `sensor`, `scene` and `blocks` are open to look at: `env.unwrapped.sensor.clean_twin()`,
     `env.unwrapped.scene.truth(...)`, `env.unwrapped.blocks.spikes`.
 
-    Errors: InputError for a value out of range or unknown, by name; NotReadyError before the first reset and
-    after `close`.
+    Observation: by default "spikes", the step's frames, (K, H, W) int8 of 0 and 1; a fresh array each step. With
+        `obs_state` a Dict: picture, gaze, age (`observations.with_state_space`).
+    Action: (2,) float32, gaze rate (pan, tilt) in [-1, 1] of `max_gaze_rate_px_s`; pan is to the right, tilt is down.
+        Values beyond are cut, as a motor saturates.
+    Reward: from `judge`, as the end of the episode is.
+    Reset: draws the scene and the camera's unit (fixed pattern, phases, noise) from `np_random`, then exposes the first
+        K frames with the camera at rest. Same seed, same actions: same bits.
+    Options: for this episode, `model` (as below, of the same frame rate), `light`, a factor on the scene's light; the
+        others are the scene's.
+    Info: time_s, frame (end of the block), gaze (2,) float64 [pixels] there, age [frames] of the picture (-1 before the
+        first valid one); with `ground_truth` also radiance, flow, object_id at the centre of the block and poses, see
+        `scenes.protocol.Truth`.
+    Render: `rgb_array`, the share of frames with a spike, over the last blocks of RENDER_FRAMES or more; white is a
+        spike every frame, gamma 2.2.
+
+    Args:
+        make_scene: see `MakeScene`; its scenes have this `shape` and the model's frame rate.
+        judge: see `Judge`.
+        shape: (rows, columns).
+        model: a preset's name, a TOML path or a SensorModel.
+        frames_per_step: K; the control rate is frame rate / K.
+        packed: the same as obs="packed".
+        obs: a name of `observations.OBSERVATIONS` or an `Observation`; default `usual_obs` of the class.
+        obs_state: whether gaze and age of the picture are observed beside it.
+        ground_truth: whether infos hold the truth.
+        max_gaze_rate_px_s: default 4 of the shorter side a second.
+        engine: of the sensor, "auto", "fast" or "reference".
+        threads: of the sensor, as of `SpikeSensor`.
+        render_mode: "rgb_array" or None.
+
+    Raises:
+        InputError: for a value out of range or unknown, by name.
+        NotReadyError: before the first reset and after `close`.
     """
 
     metadata: dict[str, Any] = {"render_modes": ["rgb_array"], "render_fps": 25}  # noqa: RUF012
@@ -130,7 +139,7 @@ class SpikeCameraEnv(gymnasium.Env[Any, NDArray[np.float32]]):
         self._engine, self._threads = engine, threads
         self._sensor: SpikeSensor | None = self._unit_of(self.model, seed=0)
         self._scene: Scene | None = None
-        self._drawn: Any = None  # the scene as it was drawn: in its own light, and with all that its task knows of it
+        self._drawn: Any = None  # the scene as it was drawn, in its own light
         self._seen: Any = None
         self._blocks: Blocks | None = None
         self._gaze = Gaze.fixed(0.0, 0.0)  # the path of the block that is exposed last, or next
@@ -163,9 +172,14 @@ class SpikeCameraEnv(gymnasium.Env[Any, NDArray[np.float32]]):
         return self.outcome()
 
     def begin(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> None:
-        """What `reset` does before the first block is exposed; a task that knows more overrides it, as the next three.
+        """Begin an episode, up to the exposure of its first block.
 
-        So a vector environment exposes the blocks of all its cameras in one call (`expose`).
+        `reset` calls `begin` and `begun`, `step` calls `turn` and `outcome`; a task overrides these four.  Between the
+        two, a vector environment exposes the blocks of all its cameras in one call (`expose`).
+
+        Args:
+            seed: as of `reset`.
+            options: as of `reset`.
         """
         self._open()
         given = as_dictionary(options)
@@ -181,17 +195,17 @@ class SpikeCameraEnv(gymnasium.Env[Any, NDArray[np.float32]]):
         self._gaze = Gaze((0.0, 0.0), (0.0, 0.0), (0.0, float(self.frames_per_step)))
 
     def begun(self) -> tuple[Any, dict[str, Any]]:
-        """What `reset` returns, once the first block is exposed."""
+        """The return value of `reset`, from the first block."""
         return self._shown()
 
     def turn(self, action: ArrayLike) -> None:
-        """What `step` does before the block is exposed: the camera's path is set."""
+        """Set the path of the camera for the next block."""
         rates = checked_action(action, 2, "(pan, tilt)")
         frames = self.sensor.frame, self.sensor.frame + self.frames_per_step
         self._gaze = turned(self._position, rates, self.max_gaze_rate_px_s / self.model.frame_rate_hz, frames)
 
     def outcome(self) -> tuple[Any, float, bool, bool, dict[str, Any]]:
-        """What `step` returns, once the block is exposed."""
+        """The return value of `step`, from the exposed block."""
         observation, info = self._shown()
         reward, terminated = _checked_verdict(self._judge(self._drawn, self.sensor.frame, self._gaze))
         return observation, reward, terminated, False, info
@@ -218,7 +232,7 @@ class SpikeCameraEnv(gymnasium.Env[Any, NDArray[np.float32]]):
 
     @property
     def view(self) -> CameraView:
-        """What observations know of the camera."""
+        """The camera, as observations know it."""
         return CameraView(self.shape, self.frames_per_step, self.model.frame_rate_hz)
 
     @property
@@ -228,7 +242,7 @@ class SpikeCameraEnv(gymnasium.Env[Any, NDArray[np.float32]]):
 
     @property
     def blocks(self) -> Blocks:
-        """What the camera exposed last, a batch of one; NotReadyError before the first reset and after `close`."""
+        """The last block, a batch of one; NotReadyError before the first reset and after `close`."""
         if self._blocks is None:
             raise self._not_ready()
         return self._blocks
@@ -271,24 +285,24 @@ class SpikeCameraEnv(gymnasium.Env[Any, NDArray[np.float32]]):
         return not isinstance(self.scene, PlanarScene)
 
     @property
-    def asked(self) -> tuple[int, int, Gaze]:
-        """Frames from and to, and the camera's path, of the block that is to be exposed."""
+    def next_block(self) -> tuple[int, int, Gaze]:
+        """First frame, frame after the last, and path of the camera, of the next block."""
         first, stop = self._gaze.frames
         return int(first), int(stop), self._gaze
 
-    def take_seat(self, sensor: Any) -> None:
-        """Have another camera, as a vector environment does on a device: with `frame`, `model` and `reset(seed)`."""
+    def use_sensor(self, sensor: Any) -> None:
+        """Set another camera, which has `frame`, `model` and `reset(seed)`: one of a batch on a device."""
         self._sensor = sensor
 
-    def take(self, light: Keyframes, spikes: NDArray[np.uint8]) -> None:
-        """A block, exposed along the camera's path: spikes (K, H, W)."""
+    def record(self, light: Keyframes, spikes: NDArray[np.uint8]) -> None:
+        """Keep the exposed block: spikes (K, H, W)."""
         self._blocks = Blocks(spikes[None], (light,), self.model.frame_rate_hz)
         if self.render_mode is not None:
             blocks = -(-RENDER_FRAMES // self.frames_per_step)
             self._recent = [*self._recent, spikes.copy()][-blocks:]
 
     def _shown(self) -> tuple[Any, dict[str, Any]]:
-        """What is seen of the last block, and what is known of it."""
+        """The observation of the last block, and its info."""
         picture, self._seen = self.observation.step(self.blocks, self._seen)
         _check_picture(picture, self._picture_space, self.observation)
         age = float(np.asarray(self.observation.age(self._seen)).reshape(-1)[0])
@@ -312,7 +326,7 @@ class SpikeCameraEnv(gymnasium.Env[Any, NDArray[np.float32]]):
         return info
 
     def _checked_model(self, model: SensorModel | str | PathLike[str]) -> SensorModel:
-        """The model of an episode; raises InputError where scenes of this environment are not of its frame rate."""
+        """The model of an episode; InputError where scenes of this environment are not of its frame rate."""
         loaded = _loaded(model)
         if loaded.frame_rate_hz != self.model.frame_rate_hz:
             raise InputError(
@@ -332,12 +346,12 @@ class SpikeCameraEnv(gymnasium.Env[Any, NDArray[np.float32]]):
         return scene
 
 
-def _checked_verdict(found: Any) -> tuple[float, bool]:
-    """What a judge returned.  Raises OwnCodeError unless it is a finite reward and whether the episode is over."""
-    reward, terminated = found if isinstance(found, tuple) and len(found) == 2 else (None, None)
+def _checked_verdict(verdict: Any) -> tuple[float, bool]:
+    """The verdict of a judge; OwnCodeError unless it is a finite reward and whether the episode is over."""
+    reward, terminated = verdict if isinstance(verdict, tuple) and len(verdict) == 2 else (None, None)
     number = as_number(reward)
     if not isfinite(number) or not isinstance(terminated, bool | np.bool_ | int):
-        raise OwnCodeError(f"judge returned {shown(found)}; it must return (reward, terminated): a number and a bool")
+        raise OwnCodeError(f"judge returned {shown(verdict)}; it must return (reward, terminated): a number and a bool")
     return number, bool(terminated)
 
 
@@ -358,26 +372,29 @@ def expose(
     *,
     outs: Sequence[NDArray[np.uint8] | None] | None = None,
     threads: int | None = 1,
-    each: Each = in_turn,
+    each: ForEach = in_turn,
 ) -> None:
-    """The next block of every environment, along the path that its camera has taken: planes are painted in one call,
-    cameras stepped in one call.
+    """Expose the next block of every environment: planes are painted in one call, cameras stepped in one call.
 
-    outs: arrays (K, H, W) uint8 for the spikes.  threads: of these calls.  each: asks the scenes that are no planes.
+    Args:
+        envs: whose cameras expose, each along its path.
+        outs: arrays (K, H, W) uint8 for the spikes.
+        threads: of these calls.
+        each: calls a function of the number of each scene that is no plane.
     """
-    lights = lights_of(envs, threads=threads, each=each)
+    lights = lights_of(envs, partial(painted_planes, threads=threads), each)
     spikes = step_together([env.sensor for env in envs], lights, envs[0].frames_per_step, outs=outs, threads=threads)
     for env, own, block in zip(envs, lights, spikes, strict=True):
-        env.take(own, block)
+        env.record(own, block)
 
 
-def lights_of(envs: Sequence[SpikeCameraEnv], *, threads: int | None = 1, each: Each = in_turn) -> list[Keyframes]:
-    """The light of the block that every environment is to expose; arguments as of `expose`."""
+def lights_of(envs: Sequence[SpikeCameraEnv], paint: Paint, each: ForEach = in_turn) -> list[Keyframes]:
+    """The light of the next block of every environment; `each` as of `expose`."""
     flat = [n for n, env in enumerate(envs) if not env.renders]
     other = [n for n, env in enumerate(envs) if env.renders]
-    planes = [envs[n].scene.plane(*envs[n].asked) for n in flat]  # type: ignore[attr-defined]
-    light = dict(zip(flat, painted_planes(planes, threads), strict=True))
-    light |= dict(zip(other, each(lambda n: envs[n].scene.radiance(*envs[n].asked), other), strict=True))
+    planes = [envs[n].scene.plane(*envs[n].next_block) for n in flat]  # type: ignore[attr-defined]
+    light = dict(zip(flat, paint(planes), strict=True))
+    light |= dict(zip(other, each(lambda n: envs[n].scene.radiance(*envs[n].next_block), other), strict=True))
     return [light[n] for n in range(len(envs))]
 
 

@@ -1,6 +1,7 @@
-"""What these environments reward: a place that comes nearer to the middle of the view.
+"""Rewards of these environments: a place comes nearer to the middle of the view.
 
     closeness = 1 - distance from the middle of the picture / half the picture's diagonal
+
     reward "distance" = closeness at the end of the step
     reward "progress" = PROGRESS (closeness at the end - closeness at the beginning)
 
@@ -32,7 +33,11 @@ def drawn_within(rng: np.random.Generator, most: float) -> tuple[float, float]:
 
 
 def checked_limit(name: str, value: float | None, default: float) -> float:
-    """The most that something is [pixels, pixels/s], or the default for None; raises InputError below 0."""
+    """The most that something is [pixels, pixels/s], or the default for None.
+
+    Raises:
+        InputError: below 0.
+    """
     return default if value is None else checked_number(value, name, 0.0)
 
 

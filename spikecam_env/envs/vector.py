@@ -13,7 +13,7 @@ from contextlib import suppress
 from copy import deepcopy
 from dataclasses import replace
 from difflib import get_close_matches
-from importlib import import_module
+from functools import partial
 from inspect import Parameter, signature
 from typing import Any, TypeVar
 
@@ -56,11 +56,9 @@ class SpikeCameraVectorEnv(VectorEnv[Any, Any, Any]):
     `autoreset_mode` says when the next episode begins where one is over.  In every mode the bits are those of
     gymnasium's `SyncVectorEnv`.
 
-    | mode | the next episode begins |
-    |---|---|
-    | NEXT_STEP | with the next step, whose action is not used and whose reward is 0 |
-    | SAME_STEP | at once; `info` has `final_obs` and `final_info` of the episode that is over |
-    | DISABLED | with `reset(options={"reset_mask": over})`, before which a step is refused |
+    - NEXT_STEP: with the next step, whose action is not used and whose reward is 0.
+    - SAME_STEP: at once; `info` has `final_obs` and `final_info` of the episode that is over.
+    - DISABLED: with `reset(options={"reset_mask": over})`, before which a step is refused.
 
     `envs` are the single environments, to look at; they expose the block, and the observation is made of the blocks
     of all at once.  A vector environment can be pickled and copied.
@@ -175,12 +173,8 @@ class SpikeCameraVectorEnv(VectorEnv[Any, Any, Any]):
         Args:
             actions: (N, numbers) in [-1, 1]; values beyond are cut.
 
-        Returns:
-            (observation, reward, terminated, truncated, info), each with a leading axis N.
-
         Raises:
-            InputError: for actions of another shape or type, and for numbers that are not finite; nothing is stepped
-                then.
+            InputError: for actions of another shape or type, or that are not finite; nothing is stepped then.
             NotReadyError: before the first reset, after `close`, and, where DISABLED, where an episode is over.
         """
         self._open()
@@ -204,19 +198,7 @@ class SpikeCameraVectorEnv(VectorEnv[Any, Any, Any]):
         return None if self.render_mode is None else tuple(env.render() for env in self.envs)
 
     def call(self, name: str, *args: Any, **kwargs: Any) -> tuple[Any, ...]:
-        """An attribute of every environment, called where it can be; as of gymnasium's vector environments.
-
-        Args:
-            name: of the attribute.
-            args: of the call.
-            kwargs: of the call.
-
-        Returns:
-            N values.
-
-        Raises:
-            AttributeError: for an attribute that the environments do not have.
-        """
+        """An attribute of every environment, called where it can be; as of gymnasium's vector environments."""
 
         def of(n: int) -> Any:
             attribute = self.envs[n].get_wrapper_attr(name)
@@ -233,7 +215,7 @@ class SpikeCameraVectorEnv(VectorEnv[Any, Any, Any]):
         """Set an attribute of every environment.
 
         Args:
-            name: of the attribute.
+            name: any.
             values: a list or tuple of N, or one value for all.
 
         Raises:
@@ -260,11 +242,7 @@ class SpikeCameraVectorEnv(VectorEnv[Any, Any, Any]):
         return self.get_attr("np_random")
 
     def close_extras(self, **kwargs: Any) -> None:
-        """Close every environment on its thread, and end the threads.
-
-        Args:
-            kwargs: `waits=False` does not wait until that is done.
-        """
+        """Close every environment on its thread, and end the threads; `waits=False` does not wait for that."""
         self._workers.close(lambda n: self.envs[n].close(), range(self.num_envs), **kwargs)
 
     def __del__(self) -> None:
@@ -274,11 +252,12 @@ class SpikeCameraVectorEnv(VectorEnv[Any, Any, Any]):
 
     def _on(self, device: Any) -> Any:
         """The cameras on a torch device."""
-        module = import_module("spikecam_env.envs.cameras_on_device")
-        module.check_on_device(self.observation, self.render_mode)
+        from spikecam_env.envs.cameras_on_device import DeviceCameras, check_on_device  # torch takes seconds
+
+        check_on_device(self.observation, self.render_mode)
         if self.autoreset_mode is AutoresetMode.SAME_STEP and not self.observation.begins_alone:
             raise InputError(f"autoreset_mode is SameStep and obs {_law(self)}; on a device take NextStep, or 'tfp'")
-        cameras = module.DeviceCameras(self.envs, device)
+        cameras = DeviceCameras(self.envs, device)
         self._view = replace(self._view, device=cameras.device)
         return cameras
 
@@ -301,8 +280,7 @@ class SpikeCameraVectorEnv(VectorEnv[Any, Any, Any]):
         )
 
     def _first_blocks(self, which: NDArray[np.bool_]) -> tuple[Any, Any, list[dict[str, Any]]]:
-        """The blocks with which episodes begin: what is observed of those streams, their state, and infos, empty where
-        none begins."""
+        """Observations, their state, and infos of the episodes that begin; infos are empty where none does."""
         numbers = np.flatnonzero(which).tolist()
         self._over[which], self._steps[which] = False, 0
         blocks = self._cameras.exposed(self.each, numbers)
@@ -326,7 +304,7 @@ class SpikeCameraVectorEnv(VectorEnv[Any, Any, Any]):
         return with_rows(seen, rows, over), [a if b else c for a, b, c in zip(first, over, infos, strict=True)]
 
     def _observed(self, picture: Any, state: Any, infos: Sequence[dict[str, Any]]) -> Any:
-        """What agents see of some streams; the age of the picture goes into infos."""
+        """The observation of some streams; the age of the picture goes into infos."""
         age = np.broadcast_to(self.observation.age(state), (len(infos),)).astype(np.float64)
         for info, its in zip(infos, age.tolist(), strict=True):
             info["age"] = its
@@ -403,3 +381,23 @@ def _check_phases(env: Any) -> None:
                 f"{kind.__name__} has a {name} of its own, which a vector environment would not call; override "
                 f"{parts} instead"
             )
+
+
+def whose_keyword(name: str) -> str:
+    """A hint for a keyword of vector environments alone; nothing for others."""
+    single, vector = (set(signature(kind.__init__).parameters) for kind in (SpikeCameraEnv, SpikeCameraVectorEnv))
+    if name not in vector - single - {"single", "options"}:
+        return ""
+    return 'it is of vector environments: gymnasium.make_vec(id, vectorization_mode="vector_entry_point", ...)'
+
+
+def __getattr__(name: str) -> Any:
+    """Entry points of vector environments: `spikecam_env.envs.vector:MODULE.CLASS` is the vector of `MODULE:CLASS`.
+
+    gymnasium looks a vector environment up as an attribute of a module, by text, so that specifications can be written
+    to files; every class of environments thus has one, and none has to be declared.
+    """
+    module, dot, single = name.rpartition(".")
+    if not dot:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    return partial(SpikeCameraVectorEnv, f"{module}:{single}")

@@ -19,9 +19,6 @@ MISSING = object()
 def batched(infos: Sequence[dict[str, Any]]) -> dict[str, Any]:
     """By name an array (N, ...), and as `_name` which environments have it.
 
-    Args:
-        infos: N.
-
     Returns:
         Numbers and arrays are 0 where an environment has none; dictionaries are dictionaries of such; anything else,
         and "final_obs", is an object.
@@ -42,14 +39,7 @@ def batched(infos: Sequence[dict[str, Any]]) -> dict[str, Any]:
 
 
 def rows(infos: dict[str, Any], count: int) -> list[dict[str, Any]]:
-    """The info of each environment, with Python's own numbers.
-
-    Args:
-        infos: as `batched` has them.
-        count: N.
-
-    Returns:
-        N infos.
+    """The N infos of `batched`, with Python's own numbers.
 
     Example:
         >>> rows(batched([{"on_target": True}, {"on_target": False, "episode_number": 7}]), 2)

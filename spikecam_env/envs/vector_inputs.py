@@ -25,18 +25,8 @@ RESET_MASK = "reset_mask"
 def checked_mode(mode: Any) -> AutoresetMode:
     """The autoreset mode.
 
-    Args:
-        mode: an `AutoresetMode` or its value: "NextStep", "SameStep", "Disabled".
-
-    Returns:
-        The mode.
-
     Raises:
-        InputError: for anything else.
-
-    Example:
-        >>> checked_mode("SameStep").name
-        'SAME_STEP'
+        InputError: for anything but an `AutoresetMode` or its value: "NextStep", "SameStep", "Disabled".
     """
     for known in AutoresetMode:
         if mode is known or (isinstance(mode, str) and mode == known.value):
@@ -50,9 +40,6 @@ def checked_limit(steps: Any, usual: int | None = None) -> int | None:
     Args:
         steps: 1 or more; -1 for no limit, and None for the usual one, as `gymnasium.make` has them.
         usual: the limit where none is given; None for no limit.
-
-    Returns:
-        The steps, or None for no limit.
 
     Raises:
         InputError: for anything else.
@@ -69,14 +56,7 @@ def checked_limit(steps: Any, usual: int | None = None) -> int | None:
 
 
 def checked_models(models: Any, count: int) -> list[dict[str, Any]]:
-    """Keywords of each environment for its own model.
-
-    Args:
-        models: N models, or None where all have the same.
-        count: N.
-
-    Returns:
-        N dictionaries, empty where all have the same model.
+    """Keywords of each environment for its own model; none where `models` is None.
 
     Raises:
         InputError: for models that are not N in a sequence.
@@ -97,11 +77,8 @@ def checked_seeds(seed: Any, count: int) -> list[int | None]:
         seed: s for s, s + 1, ...; or a sequence of N, each a seed or None; or None, for no seed at all.
         count: N.
 
-    Returns:
-        N seeds.
-
     Raises:
-        InputError: for another number of seeds, and for what is no seed.
+        InputError: for another number of seeds, and for a value that is no seed.
 
     Example:
         >>> checked_seeds(5, 2), checked_seeds([7, None], 2)
@@ -151,11 +128,8 @@ def checked_actions(actions: Any, shape: tuple[int, ...]) -> NDArray[Any]:
     """Actions of all environments, of finite numbers; values beyond [-1, 1] are cut by each environment.
 
     Args:
-        actions: as they were given: an array or a tensor, or lists of numbers.
+        actions: an array or a tensor, or lists of numbers.
         shape: (N, numbers).
-
-    Returns:
-        An array of this shape.
 
     Raises:
         InputError: for another shape, for values of another type, and for numbers that are not finite.

@@ -23,9 +23,6 @@ threads end with the last reference to it: a pool in a cycle of garbage would ta
 class Workers:
     """So many threads, started as they are needed; a copy has threads of its own.
 
-    Args:
-        count: of threads.
-
     Example:
         >>> workers = Workers(2)
         >>> workers.each(lambda number: 10 * number, [3, 4, 5])
@@ -45,19 +42,12 @@ class Workers:
         return Workers, (len(self),)
 
     def each(self, work: Callable[[int], T], numbers: Sequence[int]) -> list[T]:
-        """Work of each of these numbers, done on its own thread.
-
-        Args:
-            work: of a number.
-            numbers: any.
-
-        Returns:
-            A value for each number.  Where some fail, the first error is raised when all are done.
+        """Work of each of these numbers, done on its own thread; the first error is raised when all are done.
 
         Raises:
             NotReadyError: in a fork of the process that made them.
         """
-        futures = self._begun(work, numbers)
+        futures = self._submitted(work, numbers)
         wait(futures.values())
         done = {n: iter(future.result()) for n, future in futures.items()}
         return [next(done[n % len(self)]) for n in numbers]
@@ -65,24 +55,18 @@ class Workers:
     def close(
         self, last: Callable[[int], Any] | None = None, numbers: Sequence[int] = (), *, waits: bool = True
     ) -> None:
-        """End the threads; in a fork, which has none, nothing is done.
-
-        Args:
-            last: work that each of these numbers does before.
-            numbers: any.
-            waits: until it is done.
-        """
+        """End the threads after the last work of these numbers; in a fork, which has none, nothing is done."""
         if self._process != os.getpid():
             return
-        futures = self._begun(last, numbers) if last is not None else {}
+        futures = self._submitted(last, numbers) if last is not None else {}
         _POOLS.difference_update(self._pools)
         for pool in self._pools:
             pool.shutdown(wait=waits)
         for future in futures.values() if waits else ():
             future.result()
 
-    def _begun(self, work: Callable[[int], T], numbers: Sequence[int]) -> dict[int, Future[list[T]]]:
-        """By thread."""
+    def _submitted(self, work: Callable[[int], T], numbers: Sequence[int]) -> dict[int, Future[list[T]]]:
+        """Futures by the number of the thread."""
         if self._process != os.getpid():  # whose threads a fork does not have: work given to them is never done
             raise NotReadyError("the environments belong to the process that made them; make others in this one")
         shares: dict[int, list[int]] = {}

@@ -1,4 +1,4 @@
-"""Agents: what they remember, that learning can be repeated and resumed, files, the tracker, and the shipped ones."""
+"""Agents: their memory, that learning can be repeated and resumed, files, the tracker, and the shipped ones."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What is in a scene's file: both streams, the truth, and all that is needed to make it again."""
+"""Contents of a scene's file: both streams, the truth, and all that is needed to make it again."""
 
 from __future__ import annotations
 

@@ -15,7 +15,7 @@ from spikecam_env.envs.oracle import oracle
 from spikecam_env.envs.registration import ENVIRONMENTS, SMALL_TASKS, TASK_NAMES
 
 SEEDS = (0,)
-"""Of the episodes that are played at every scene id: what differs is the motion of the scene."""
+"""Of the episodes that are played at every scene id: their scenes move differently."""
 
 
 def nothing(course: StepOutcome) -> Any:

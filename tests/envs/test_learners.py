@@ -30,7 +30,7 @@ NO_PICTURES = {
     "isi": "image but its `dtype` is",
     "packed": "unconventional shape",
 }
-"""Observations that are no uint8 pictures, and what stable-baselines3 says of them: another network is needed."""
+"""Observations that are no uint8 pictures, and the warnings of stable-baselines3: another network is needed."""
 
 
 PICTURES = [name for name in OBSERVATIONS if name not in NO_PICTURES]
@@ -79,7 +79,7 @@ def test_stable_baselines_is_content_with_every_kind_of_scene(name: str, obs: st
 
 
 @pytest.mark.parametrize("obs", NO_PICTURES)
-def test_what_is_no_picture_is_named_as_such_and_nothing_else_is_wrong(obs: str) -> None:
+def test_an_observation_that_is_no_picture_is_named_and_nothing_else_is_wrong(obs: str) -> None:
     with pytest.raises(UserWarning, match=NO_PICTURES[obs]):
         checked(TRACK, obs=obs)
     check = importlib.import_module("stable_baselines3.common.env_checker").check_env
@@ -116,7 +116,7 @@ def test_the_example_learns_and_is_judged() -> None:
     assert 0 <= result.performance <= 1 and len(result.performances) == 3
 
 
-def test_a_model_of_stable_baselines_is_scored_on_what_its_frame_stack_shows() -> None:
+def test_a_model_of_stable_baselines_is_scored_on_the_pictures_of_its_frame_stack() -> None:
     """Bit for bit, over the first steps of an episode."""
     vectors = pytest.importorskip("stable_baselines3.common.vec_env", reason="needs stable-baselines3")
     env = gymnasium.make(TRACK, **SMALL)

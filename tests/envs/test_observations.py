@@ -1,4 +1,4 @@
-"""What agents are shown, against what it is by definition, and how its state begins anew."""
+"""Observations against their definitions, and how their state begins anew."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ def stream(seed: int = 0) -> np.ndarray:
 
 
 def shown(law: Observation, spikes: np.ndarray, cut: int) -> list[np.ndarray]:
-    """What is seen after every `cut` frames."""
+    """The pictures after every `cut` frames."""
     state, seen = law.start(CameraView(VIEW.shape, cut), len(spikes)), []
     for first in range(0, spikes.shape[1], cut):
         picture, state = law.step(Blocks(spikes[:, first : first + cut]), state)
@@ -80,7 +80,7 @@ def test_tfp_is_the_share_of_the_last_frames(window: int) -> None:
 
 
 def test_isi_is_the_last_whole_interval_or_the_wait() -> None:
-    """By `streams.isi_plane` of all frames so far, which sees nothing of what comes later."""
+    """By `streams.isi_plane` of all frames so far, which sees nothing of later frames."""
     spikes = stream()
     for number, picture in enumerate(shown(ISI(), spikes, 8), start=1):
         known = spikes[0, : 8 * number]

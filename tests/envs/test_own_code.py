@@ -1,4 +1,4 @@
-"""What a user gives an environment, scenes, judges and observations, is checked where it returns."""
+"""Scenes, judges and observations of users are checked where they return."""
 
 from __future__ import annotations
 

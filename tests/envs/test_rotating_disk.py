@@ -138,15 +138,6 @@ def test_render_is_a_picture_of_the_recent_spikes() -> None:
     assert make().render() is None
 
 
-def test_make_vec_gives_each_camera_its_own_seed() -> None:
-    vector = gymnasium.make_vec(ID, num_envs=2, vectorization_mode="sync", **SMALL)
-    observation, _ = vector.reset(seed=5)
-    assert observation.shape == (2, 8, 24, 32)
-    np.testing.assert_array_equal(observation[1], make().reset(seed=6)[0])
-    vector.step(vector.action_space.sample())
-    vector.close()
-
-
 def test_model_file_and_scene_options_reach_the_camera(tmp_path: Any) -> None:
     path = tmp_path / "slow.toml"
     SensorModel.preset("physical").to_toml(path)
@@ -176,18 +167,12 @@ def test_bad_options_are_named(option: dict[str, Any], message: str) -> None:
         RotatingDiskEnv(**{**SMALL, **option})
 
 
-def test_bad_calls_are_named() -> None:
+def test_nothing_works_before_the_first_reset() -> None:
     env = RotatingDiskEnv(**SMALL, render_mode="rgb_array")
     with pytest.raises(NotReadyError, match="call reset"):
         env.step(np.zeros(2))
     with pytest.raises(NotReadyError, match="call reset"):
         env.render()
-    with pytest.raises(InputError, match="unknown option of reset 'center'"):
-        env.reset(options={"center": (1, 2)})
-    env.reset(seed=0)
-    for action in (np.zeros(3), np.array([np.nan, 0.0])):
-        with pytest.raises(InputError, match="two finite numbers"):
-            env.step(action)
 
 
 def test_a_scene_of_another_size_is_refused() -> None:

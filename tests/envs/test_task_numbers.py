@@ -1,4 +1,4 @@
-"""The numbers that the tasks are made of: each is half and twice what it is in turn, and a property of its task fails.
+"""The numbers of the tasks: with each halved and doubled in turn, a property of its task fails.
 
 A property is a quantity that is measured on the task, mostly on forty episodes without their pictures, and the range
 that it is to lie in.  Its words are the quantity's docstring.
@@ -77,7 +77,7 @@ def crossings(of: Task) -> float:
 
 
 def coasting(of: Task) -> float:
-    """The gaze coasts on from its top rate by about half of what counts as on the target: an agent has to brake."""
+    """The gaze coasts on from its top rate by about half the radius of the target's circle: an agent has to brake."""
     return of.top_sides_s * of.rise_s / 2 / of.success_side
 
 
@@ -335,7 +335,7 @@ def digit_reach(_: Any) -> float:
 
 
 def ink(number: int, name: str = "8") -> Any:
-    """(128, 128): what is dark of a digit."""
+    """(128, 128): the dark texels of a digit."""
     return digits.digit(name, 128, np.random.default_rng([number, 2])) < 0.5
 
 
@@ -402,8 +402,8 @@ def pace(_: Any) -> float:
 
 
 def bend(_: Any) -> float:
-    """What vibrates at 40 Hz and 80 shorter sides a second leaves a straight line by a quarter of a side between two
-    looks: it stays in view, and looks are as rare as that allows."""
+    """A body that vibrates at 40 Hz and 80 shorter sides a second leaves a straight line by a quarter of a side between
+    two looks: it stays in view, and looks are as rare as that allows."""
     turn = 2 * np.pi * 40
     return 80 / turn * (1 - float(np.cos(turn * passes.EVERY_S)))
 
@@ -479,7 +479,7 @@ class Number:
         return f"{owner.rsplit('.', 1)[-1]}.{self.name}"
 
     def measured(self, factor: float, monkeypatch: pytest.MonkeyPatch) -> float:
-        """The quantity, with the number `factor` times what it is."""
+        """The quantity, with the number `factor` times its value."""
         name, _, end = self.name.partition(".")
         value = getattr(self.owner, name)
         if not isinstance(value, tuple):

@@ -1,4 +1,4 @@
-"""The native vector environment in TorchRL: `GymWrapper` takes it, and its specs are those of what it returns."""
+"""The native vector environment in TorchRL: `GymWrapper` takes it, and its specs are those of its returned values."""
 
 from __future__ import annotations
 

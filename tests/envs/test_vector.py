@@ -1,4 +1,4 @@
-"""Vector environments as users make them (`tests.envs.vectors`), and what `close` gives back."""
+"""Vector environments as users make them (`tests.envs.vectors`), and the resources that `close` gives back."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ from spikecam_env.errors import InputError, NotReadyError
 from tests.envs.vectors import MANY
 
 LONGEST_S = 600.0
-"""Ten times what the slowest takes on two cores: what is not done by then hangs."""
+"""Ten times what the slowest takes on two cores: a program that takes longer hangs."""
 
 SMALL: dict[str, Any] = {"shape": (16, 16), "frames_per_step": 8}
 
@@ -33,9 +33,9 @@ POOLS = {"OMP_NUM_THREADS": "2", "GOMP_SPINCOUNT": "10000"}
 """Torch has threads that a fork does not copy, as it has for users; where they wait, they spin briefly."""
 
 
-def alone(what: str) -> str:
-    """What `tests.envs.vectors` prints about it, in a process group of its own that is killed where it hangs."""
-    command = [sys.executable, "-m", "tests.envs.vectors", what]
+def alone(program: str) -> str:
+    """The output of a program of `tests.envs.vectors`, in a process group of its own that is killed where it hangs."""
+    command = [sys.executable, "-m", "tests.envs.vectors", program]
     process = subprocess.Popen(
         command,
         stdout=subprocess.PIPE,
@@ -48,7 +48,7 @@ def alone(what: str) -> str:
         printed, _ = process.communicate(timeout=LONGEST_S)
     except subprocess.TimeoutExpired:
         os.killpg(process.pid, signal.SIGKILL)
-        pytest.fail(f"{what} hangs: {process.communicate()[0]}")
+        pytest.fail(f"{program} hangs: {process.communicate()[0]}")
     print(printed)
     assert process.returncode == 0, printed
     return printed
@@ -57,7 +57,7 @@ def alone(what: str) -> str:
 @pytest.mark.slow
 @pytest.mark.skipif(not hasattr(os, "fork"), reason="no fork on this system")
 def test_every_kind_of_id_forks_with_and_without_the_denoiser_and_gives_the_bits_of_a_synchronous_run() -> None:
-    """Scenes of a kind have the same renderer, kernels and pools, which are what a fork may break."""
+    """Scenes of a kind have the same renderer, kernels and pools, which a fork may break."""
     assert "ids" in alone("every_kind")
 
 

@@ -1,4 +1,4 @@
-"""`python -m tests.envs.vectors WHAT`: vector environments as users make them, in a process that may hang."""
+"""`python -m tests.envs.vectors PROGRAM`: vector environments as users make them, in a process that may hang."""
 
 from __future__ import annotations
 
@@ -15,10 +15,11 @@ import numpy as np
 from gymnasium.vector import AsyncVectorEnv, SyncVectorEnv
 
 import spikecam_env.envs  # noqa: F401
-from spikecam_env.envs.registration import SMALL_TASKS
 from tests.envs.kinds import DISK, KINDS
 
 SMALL: dict[str, Any] = {"shape": (16, 16), "frames_per_step": 20, "obs": "spikes"}
+TASKS = ("spikecam_env/Track-v1", "spikecam_env/Catch-v1", "spikecam_env/Exposure-v1")
+"""Flat discs, a camera that only pans, and a scene in changing light: other tasks have the same code behind them."""
 STEPS = 2
 """The denoiser's frames come 31 late: they are seen from the first step on."""
 
@@ -30,7 +31,7 @@ Maker = Callable[[], gymnasium.Env]
 
 
 class Beside(gymnasium.Wrapper):
-    """Info `spikes` is what the environment within shows, whatever wrappers make of it."""
+    """Info `spikes` is the observation of the environment within, below all other wrappers."""
 
     def reset(self, **options: Any) -> tuple[Any, dict[str, Any]]:
         observation, info = self.env.reset(**options)
@@ -57,7 +58,7 @@ def denoised(name: str) -> Maker:
 
 
 def alike(names: Iterable[str]) -> list[list[str]]:
-    """The ids with equal actions together; each is made once, so that what follows from its scene is known to forks."""
+    """The ids with equal actions together; each is made once, so that forks have the caches of its scene."""
     groups: dict[tuple[int, ...], list[str]] = {}
     for name in names:
         env = plain(name)()
@@ -82,9 +83,9 @@ def seen(vector: Any) -> dict[str, np.ndarray]:
     return {name: np.stack(arrays) for name, arrays in found.items()}
 
 
-def same(a: dict[str, np.ndarray], b: dict[str, np.ndarray], what: str) -> None:
+def same(a: dict[str, np.ndarray], b: dict[str, np.ndarray], way: str) -> None:
     for name in a:
-        assert np.array_equal(a[name], b[name]), f"{what}: {name} differs"
+        assert np.array_equal(a[name], b[name]), f"{way}: {name} differs"
 
 
 @numba.njit(parallel=True)
@@ -113,7 +114,7 @@ def every_kind() -> None:
     imports_it_itself = seen(AsyncVectorEnv([denoised(DISK)]))
     import denoiser  # noqa: F401  # as most users have it: the forks that follow need not import torch each
 
-    groups = alike([*KINDS, *SMALL_TASKS])
+    groups = alike([*KINDS, *TASKS])
     fresh = [seen(AsyncVectorEnv([denoised(name) for name in group])) for group in groups]
     for group, forked in zip(groups, fresh, strict=True):
         same(forked, seen(SyncVectorEnv([denoised(name) for name in group])), f"{group}, synchronous")

@@ -1,7 +1,7 @@
 """The hidden world: an independent generator of measurement campaigns, and the trial that scores a diagnosis on them.
 
 It shares no code with `spikecam_env`: its own equations (`integrator`), its own fixed patterns (`unit`), its own light
-(`light`), its own writer (`campaign`).  What may be hidden: `catalogue` (effects that the diagnosis knows), `outside`
+(`light`), its own writer (`campaign`).  Hidden mechanisms: `catalogue` (effects that the diagnosis knows), `outside`
 (mechanisms that it does not), `tricky` (labels that lie, effects in one place or at one time).
 `cases` lists the trial, `keys` seals the answers, `score` compares.  By hand:
 

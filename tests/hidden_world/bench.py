@@ -34,6 +34,11 @@ def plain_camera(
     )
 
 
+def near(value: float, expected: float, tolerance: float) -> None:
+    print(f"{value:.5g}, expected {expected:.5g} +- {tolerance:.2g}")
+    assert abs(value - expected) <= tolerance
+
+
 def filmed(
     camera: Camera, light: Light | float, frames: int, hidden: Sequence[Hidden] = (), seed: int = 1
 ) -> NDArray[np.uint8]:
@@ -72,7 +77,7 @@ def walk_of_spikes(bits: NDArray[np.uint8], k: int) -> float:
 def says_dead_time(
     campaign: Path, model: str, out: Path, seed: int, exclude: tuple[str, ...], threads: int
 ) -> dict[str, Any]:
-    """A diagnosis that always says the same, and keeps a list of what it was given."""
+    """A diagnosis that always says the same, and keeps a list of its inputs."""
     log = campaign.parents[1] / "asked.txt"
     files = " ".join(sorted({p.suffix for p in campaign.iterdir()}))
     with log.open("a", encoding="utf-8") as file:

@@ -1,13 +1,14 @@
-"""The trial's cases: what is hidden, what the diagnosis is told, what counts as right.
+"""Cases of the trial: the hidden mechanisms, the labels for the diagnosis, the right answers.
 
-Groups: `none`, `strong` (3 to 10 times the limit), `weak` (1 to 3), `severe` (30 to 100), `base` (the base model's own
-effects, told `ideal`), `outside`, `left_out` (a catalogue effect, its name withheld), `pair` (3 to 10 each), `tricky`,
-`strong_pair` and `triple` (5 to 100 each, of different families).
+Groups of no or one effect: `none`, `strong` (3 to 10 times the limit), `weak` (1 to 3), `severe` (30 to 100).  Groups
+of special cases: `base` (the base model's own effects, told `ideal`), `outside`, `left_out` (a catalogue effect, its
+name withheld), `tricky`.  Groups of several effects: `pair` (3 to 10 each), `strong_pair` and `triple` (5 to 100 each,
+of different families).
 
 The sets `quick` and `full` hide effects by their near laws only; `laws` by near and far ones.  `small` is as `laws`, of
 small cameras that are recorded for less long: an eighth of the data, and effects as many limits of that strong.  No two
-parts or sets share a seed; `tune` shares no outside mechanism with the others.  Of `report` cases have been looked at
-since, to find what was wrong; `verify` is as `report`, of seeds that were not.
+parts or sets share a seed; `tune` shares no outside mechanism with the others.  Cases of
+`report` have been looked at since, to find faults; `verify` is as `report`, of other seeds.
 """
 
 from __future__ import annotations
@@ -36,7 +37,7 @@ BASE_CAMERAS = ("scsim", "physical")
 
 @dataclass(frozen=True)
 class Answer:
-    """A predicate on a diagnosis: one of these verdicts, all these names among its effects, and what else it must hold.
+    """A predicate on a diagnosis: one of these verdicts, all these names among its effects, and further conditions.
 
     place: an effect or the description says where (`where`, `region`) or when (`when`).
     not_testable: a name listed so.
@@ -110,7 +111,7 @@ WITHHELD_TOO = {
     **{name: tuple(other for other in BENDS if other != name) for name in BENDS},
     "hot_pixels": ("dark_current_tail",),
 }
-"""Names that describe the same data as well, within what these recordings show; withheld with their twin."""
+"""Names that these recordings do not tell apart; they are withheld with their twin."""
 
 NOT_LEFT_OUT = ("excess_threshold_noise",)
 """Without its name it is a wrong parameter (reset_noise), not something unknown."""

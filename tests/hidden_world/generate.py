@@ -17,7 +17,7 @@ from tests.hidden_world.world import MECHANISMS, Recipe, stream, write_campaign
 
 
 def main(arguments: list[str] | None = None) -> None:
-    """Write one campaign, and beside it (never in it) DIR.key.json with what is hidden."""
+    """Write one campaign, and beside it (never in it) DIR.key.json with its key."""
     parser = argparse.ArgumentParser(description=__doc__)
     known = sorted(
         f"{m.name}/{law.name}" if law is not m else m.name for m in MECHANISMS.values() for law in (m, *m.far)

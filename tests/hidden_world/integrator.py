@@ -56,7 +56,7 @@ def _no_events() -> tuple[Array, Whole, Array]:
 
 @dataclass
 class Physics:
-    """What one recording of one camera goes through; charge in thresholds, times in frames.
+    """The physics of one recording of one camera; charge in thresholds, times in frames.
 
     P pixels row by row, T frames.
 
@@ -102,7 +102,7 @@ class Physics:
     bloom_share: float = 0.0
     bloom_full: float = 1.0
     bloom_to: tuple[tuple[int, int], ...] = ()
-    """(rows, columns) away that what is beyond `bloom_full` goes, in equal parts"""
+    """(rows, columns) away that the charge beyond `bloom_full` goes, in equal parts"""
     trap_charge: float = 0.0
     """charge a frame when all traps are full (persistence)"""
     trap_half: float = 1.0
@@ -149,7 +149,7 @@ class Physics:
     """c of a delay c / x^delay_power"""
     delay_power: float = 0.5
     hold_loss: float = 0.0
-    """share lost of what comes between a crossing and the end of its frame"""
+    """share lost of the charge between a crossing and the end of its frame"""
     hold_chance: float = 1.0
     """share of the resets that lose it"""
     left_always: float = 0.0
@@ -202,7 +202,7 @@ class Physics:
 
     @property
     def laws(self) -> Laws:
-        """What a crossing does."""
+        """The laws of a crossing."""
         return Laws(
             self.dead, self.dead_by_light, self.delay, self.delay_power, self.hold_loss, self.hold_chance,
             self.left_always, self.left_fraction, self.left_tau, self.ramp_loss, self.ramp_tau, self.alternate,
@@ -292,10 +292,10 @@ def _pieces(cycles: float) -> int:
 
 
 class Recording:
-    """A recording under way: what the pixels remember, and the frames that come next."""
+    """A recording under way: the state of the pixels, and the frames that come next."""
 
     def __init__(self, physics: Physics, rng: np.random.Generator) -> None:
-        """Pixels anywhere in their first cycle, what is slow in its steady state at frame 0, traps empty."""
+        """Pixels anywhere in their first cycle, slow parts in their steady state at frame 0, traps empty."""
         ph, count = physics, physics.gain.size
         self.physics, self.rng = ph, rng
         self.pixels = Pixels(
@@ -456,7 +456,7 @@ class Recording:
 
 
 def _events(events: tuple[Array, Whole, Array], target: Array) -> Callable[[int], None]:
-    """A function of the frame that adds to `target` what has happened by then, each event once."""
+    """A function of the frame that adds to `target` the events up to then, each once."""
     frame, pixel, size = events
     done = 0
 
@@ -473,7 +473,7 @@ def _events(events: tuple[Array, Whole, Array], target: Array) -> Callable[[int]
 def _steps(steps: tuple[Array, Whole, Array], early: Array, columns: int, dark: Array) -> Callable[[int], Array | None]:
     """A function of the frame that changes `dark` (P,) by the steps before its end.
 
-    It returns what of the frame's charge is too much by, or nothing: a step counts from its moment on.
+    It returns the excess of the frame's charge, or nothing: a step counts from its moment on.
     """
     time, pixel, size = steps
     own = time + (early[pixel // columns] if early.size > 1 else early[0])  # by the clock of the pixel's windows

@@ -1,7 +1,7 @@
 """Answers under seal: written before anything is diagnosed, their hashes published, opened by the scorer alone.
 
-OUT/manifest.json        what is tried: opaque ids, model, names left out, SHA-256 of each key
-OUT/sealed/ID.json       the key: what is hidden, what counts as right
+OUT/manifest.json        the trial: opaque ids, model, names left out, SHA-256 of each key
+OUT/sealed/ID.json       the key: hidden mechanisms and right answers
 """
 
 from __future__ import annotations

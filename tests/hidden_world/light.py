@@ -1,4 +1,4 @@
-"""What the hidden camera is shown: radiance at keys of any times, linear between them, constant outside.
+"""The light before the hidden camera: radiance at keys of any times, linear between them, constant outside.
 
 A plan is a list of recordings; each holds exactly the numbers that its radiance file will hold.
 """

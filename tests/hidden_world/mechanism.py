@@ -1,9 +1,9 @@
-"""What a hidden mechanism is: a name, its laws, the parameters it is drawn with, and where it takes hold.
+"""A hidden mechanism: a name, its laws, the parameters it is drawn with, and where it takes hold.
 
     camera    once a unit: its arrays
-    light     once a recording: what falls on the pixels, key by key (linear optics)
+    light     once a recording: light on the pixels, key by key (linear optics)
     physics   once a recording: fields of `integrator.Physics`
-    bits      once a recording: what is reported
+    bits      once a recording: the reported spikes
 
 Each takes the parameters and a generator of its own.  A recording's generator differs from recording to recording.
 """
@@ -60,7 +60,7 @@ class Law:
 class Mechanism(Law):
     """A mechanism by its name in limits.toml.  It is its own near law; `far` are the others.
 
-    describe: what a right description of it says (outside the catalogue).  signs: of the strength.
+    describe: words of a right description (outside the catalogue).  signs: of the strength.
     """
 
     far: tuple[Law, ...] = ()
@@ -98,8 +98,8 @@ class Hidden:
 class Limit:
     """A mechanism's entry in limits.toml.
 
-    most: as far as a camera that anybody uses would go.  poor: what a poor one has, where that is thousands of limits.
-    power: of the strength, that what shows it goes by, in noises: 2 of noise beside other noise, 0.5 of rare events.
+    most: as far as a camera that anybody uses would go.  poor: that of a poor one, where it is thousands of limits.
+    power: of the strength, by which its sign grows, in noises: 2 of noise beside other noise, 0.5 of rare events.
     """
 
     parameter: str
@@ -120,7 +120,7 @@ class Limit:
 
     @property
     def furthest(self) -> float:
-        """Strength over the limit beyond which `strength` stays what it is."""
+        """Strength over the limit beyond which `strength` stays the same."""
         return self.most / self.limit
 
 

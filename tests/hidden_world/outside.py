@@ -1,4 +1,4 @@
-"""Mechanisms that no catalogue of the diagnosis holds; each says what a right description of it says.
+"""Mechanisms that no catalogue of the diagnosis holds; each has words of a right description.
 
 Two disjoint lists: TUNE may be looked at while a diagnosis is made, REPORT only when it is judged.
 """
@@ -95,13 +95,13 @@ def _persistence(ph: Physics, camera: Camera, frames: int, p: Parameters, rng: R
 
 
 def _alternate_frames(bits: Bits, p: Parameters, rng: Rng) -> Bits:
-    """What comes in an odd frame is seen in the next, in some pixels (the same ones in every recording)."""
+    """Spikes of an odd frame appear in the next, in some pixels (the same ones in every recording)."""
     moved = np.random.default_rng(int(p["which"])).random(bits[0].shape) < p["pixels"]
     return _delayed(bits, moved, period=2, slot=1)
 
 
 def _missing_slot(bits: Bits, p: Parameters, rng: Rng) -> Bits:
-    """What comes in one frame of sixteen is seen in the next, in some columns."""
+    """Spikes of one frame of sixteen appear in the next, in some columns."""
     columns = np.random.default_rng(int(p["which"])).random((1, bits.shape[2])) < p["pixels"]
     return _delayed(bits, np.broadcast_to(columns, bits[0].shape), period=16, slot=5)
 

@@ -3,7 +3,7 @@
 A frame of a pixel is its window from one read-out to the next, 0 <= u <= 1, cut at `Window.u` where something moves
 within it; between two cuts light and threshold are straight lines, charge a Brownian path.
 
-    q >= bar at u_c  ->  spike; q is what came after u_c.  Light that comes while the node is held is lost, noise too.
+    q >= bar at u_c  ->  spike; q is the charge after u_c.  Light that comes while the node is held is lost, noise too.
 
 Near its threshold only: a pixel leaps over all cuts that no noise of seven deviations can make it cross.
 """
@@ -25,7 +25,7 @@ NEVER = 2.0
 
 
 class Pixels(NamedTuple):
-    """What each pixel remembers, (P,) each.
+    """State of the pixels, (P,) each.
 
     charge [thresholds]; owed: mean charge of which the noise has not been drawn; threshold: of this cycle; blind:
     frames that the node is held from now; late: whether a spike is due when it is let go; last: its last crossing;
@@ -47,7 +47,7 @@ class Pixels(NamedTuple):
 
 
 class Laws(NamedTuple):
-    """What a crossing does, as in `integrator.Physics`."""
+    """Laws of a crossing, as in `integrator.Physics`."""
 
     dead: float
     dead_by_light: float
@@ -84,7 +84,7 @@ class Window(NamedTuple):
 
 
 class Work(NamedTuple):
-    """Pixels under way in a frame, (P,) each: their window's row; the piece, what is to come in it from `begin` to
+    """Pixels under way in a frame, (P,) each: their window's row; the piece, the charge to come in it from `begin` to
     `end`; the moment of their next event, and their seat in the queue of these; the place of a pixel among those near.
     """
 
@@ -104,7 +104,7 @@ class Work(NamedTuple):
 
 
 class Come(NamedTuple):
-    """What comes in this frame.  light, dark: (P,) charge.  tilt: (P,) half the light's change over its mean.
+    """The charge of this frame.  light, dark: (P,) charge.  tilt: (P,) half the light's change over its mean.
     stretch, shift: (P near,) on and to the thresholds, for the whole frame."""
 
     light: Array
@@ -239,18 +239,18 @@ def slow_noise(near, n, slow, slow_at, kept, sd, random, total):
 
 
 @njit(cache=True, **PLAIN)
-def give(to, what, factor, rows, columns, wraps):
-    """Add factor * what to the pixel so many rows and columns away; beyond the edge on the other side, or nowhere."""
-    height, width = what.shape
+def give(to, source, factor, rows, columns, wraps):
+    """Add factor * source to the pixel so many rows and columns away; beyond the edge on the other side, or nowhere."""
+    height, width = source.shape
     for r in range(height):
         for c in range(width):
-            if what[r, c] == 0:
+            if source[r, c] == 0:
                 continue
             i, j = r + rows, c + columns
             if wraps:
                 i, j = i % height, j % width
             if 0 <= i < height and 0 <= j < width:
-                to[i, j] += factor * what[r, c]
+                to[i, j] += factor * source[r, c]
 
 
 @njit(cache=True, **PLAIN)
@@ -528,7 +528,7 @@ def _decay_ramp(i, p, window, pixels, laws, work):
 
 @njit(inline="always", **PLAIN)
 def _enter_piece(i, p, come, window, pixels, laws, work, random):
-    """Draw what comes between the piece's beginning, or the moment that the node is let go, and its end."""
+    """Draw the charge between the piece's beginning, or the moment that the node is let go, and its end."""
     r, s = work.row[i], work.piece[i]
     a, b = window.u[r, s], window.u[r, s + 1]
     work.begin[i], work.end[i], work.entered[i] = max(a, work.open[i]), b, True
@@ -565,7 +565,7 @@ def _meets(i, p, come, window, pixels, work):
 
 @njit(inline="always", **PLAIN)
 def _reset(i, p, n, at, come, window, pixels, laws, work, random, bits):
-    """A spike at the moment `at`: the cycle begins anew, with what comes after the node is let go."""
+    """A spike at the moment `at`: the cycle begins anew, with the charge after the node is let go."""
     begin, end = work.begin[i], work.end[i]
     after = end - at
     over = max(work.rest[i], 0.0) * after / (end - begin)

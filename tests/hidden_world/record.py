@@ -1,7 +1,7 @@
-"""A trial in one file: a line a case, what it hid, what was said of it and by which code, to be scored anew or gone on
+"""A trial in one file: a line a case, its secret, its diagnosis and the code that made it, to be scored anew or gone on
 with.
 
-What scoring does not need of a diagnosis is left out.
+Parts of a diagnosis that scoring does not need are left out.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ def pack(out: Path, record: Path) -> int:
 
 
 def unpack(record: Path, out: Path, ids: Collection[str]) -> int:
-    """Put what a record holds, and OUT does not, among the results in OUT; returns how many.
+    """Add the results of a record that OUT lacks; returns their number.
 
     ids: of the trial's cases.
     Errors: ValueError if a line of it is no result, or of another trial; OSError if its folder can't be made.
@@ -47,7 +47,7 @@ def unpack(record: Path, out: Path, ids: Collection[str]) -> int:
 
 
 def _hidden(out: Path, case_id: str) -> list[str]:
-    """What a case hid, `name` by its near law or `name/law` by a far one; its diagnosis is done."""
+    """The secret of a case, `name` by its near law or `name/law` by a far one; its diagnosis is done."""
     hidden = open_key(out, case_id)["recipe"]["hidden"]
     return [f"{h['name']}/{h['law']}" if h["law"] else h["name"] for h in hidden]
 
@@ -63,7 +63,7 @@ def _result(line: str, record: Path) -> dict[str, Any]:
 
 
 def in_short(result: dict[str, Any]) -> dict[str, Any]:
-    """A result with what is scored of its diagnosis."""
+    """A result with the scored parts of its diagnosis."""
     said = result["diagnosis"]
     gap = said.get("gap")
     kept = {key: said[key] for key in SAID if key in said}

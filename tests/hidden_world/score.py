@@ -1,15 +1,15 @@
-"""What a diagnosis is worth, given its key.
+"""The score of a diagnosis, given its key.
 
 Rules
 - The names of a diagnosis are those of its `effects`; of a `class`, also its members (`class.members`, or where there
   is no such list the alternatives); of these and of a `parameter`, also the keys of `parameters`, which are off.
-- A single effect has its right name when the verdict is `named` (or `parameter`, see EQUIVALENT) and exactly
-  that effect is named, or when the verdict is `class`, the effect is among its members and the members are INSEPARABLE.
+- A single effect has its right name in two cases.  The verdict is `named` (or `parameter`, see EQUIVALENT), and exactly
+  that effect is named.  Or the verdict is `class`, the effect is among its members and the members are INSEPARABLE.
 - Its family is right when one effect of its family (FAMILIES) is named and none of another.
 - `unknown` where something of the catalogue is hidden is a false unknown.
 - A pair: an effect counts as found when it, or an equivalent, is named, or is in such a class; a third is spurious when
   it stands for neither.
-- Laws that are far from what a name says change nothing of this: a name that leaves a remainder is a name.
+- Laws that are far from the law of a name change nothing of this: a name that leaves a remainder is a name.
 - A tricky case has its own acceptable answers (`cases.Answer`).
 - Intervals beside shares are 90 % binomial ones (Clopper-Pearson).
 """
@@ -47,7 +47,7 @@ FAMILIES = {
     ),
     "read-out": ("readout_skew", "missed_spikes", "spurious_spikes", "afterpulsing"),
 }  # fmt: skip
-"""By what an engineer would go and look at."""
+"""By the part that an engineer would look at."""
 
 EQUIVALENT = (
     {"shot_noise", "reset_noise", "excess_threshold_noise"},
@@ -65,14 +65,14 @@ crossing and read-out, half a frame's in the mean, a share f is a dead time of f
 
 
 SHOWN = 1.5
-"""Floors that a gap has to be before a share of what is above the floor is more than chance over chance."""
+"""A gap of fewer floors has no share above the floor that is more than chance."""
 
 
 @dataclass(frozen=True)
 class Scored:
-    """A case and what came of it.
+    """A case and its result.
 
-    laws: of each hidden effect, the name of a far one, empty for the near.  answer: what was said, in short.
+    laws: of each hidden effect, the name of a far one, empty for the near.  answer: in short.
     spurious: names that stand for nothing hidden; off: those of them that are parameters only.
     """
 
@@ -218,7 +218,7 @@ def _parameter_errors(diagnosis: Json, hidden: dict[str, Json]) -> Iterable[Json
 
 @dataclass(frozen=True)
 class Figure:
-    """A figure of the acceptance: value, what is asked, from how many.  share: with its 90 % interval."""
+    """A figure of the acceptance: value, requirement, number of cases.  share: with its 90 % interval."""
 
     item: str
     what: str
@@ -230,7 +230,7 @@ class Figure:
 
     @property
     def met(self) -> bool:
-        """Whether the value is what is asked."""
+        """Whether the value meets the requirement."""
         sign, number = self.asked.split()[0], self.asked.split()[1]
         if "-" in number:
             low, high = (float(part) for part in number.split("-"))
@@ -345,7 +345,7 @@ def _is_close(e: Json) -> bool:
 
 
 def by_category(scored: Sequence[Scored]) -> list[Json]:
-    """One row a group and kind of law: right of how many, what was named and is not there, and how long it took.
+    """One row a group and kind of law: right of how many, wrong names, and the time.
 
     A case with an effect by a far law is `far`.  spurious effects, spurious parameters: counted one by one.
     false alarms: answers other than `none` where nothing is hidden.  Where no name is right, no law is near or far.

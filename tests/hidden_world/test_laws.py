@@ -1,7 +1,7 @@
 """Each far law has a property that is computed by hand, and that its near law has not at a strength that cases draw.
 
-A claim takes a bench with the law under trial and returns what it measures, what is computed, and the standard
-deviation of the former.  The far law is within five of them; the near law, with the same parameters, beyond ten.
+A claim takes a bench with the law under trial.  It returns a measured value, the computed one, and the standard
+deviation of the first.  The far law is within five of them; the near law, with the same parameters, beyond ten.
 """
 
 from __future__ import annotations
@@ -62,7 +62,7 @@ class Bench:
 
 
 def strongest(name: str) -> float:
-    """A hundred limits, or as far as the mechanism goes; of events, what a poor camera has."""
+    """A hundred limits, or as far as the mechanism goes; of events, those of a poor camera."""
     limit = limits()[name]
     return limit.poor or limit.strength(100.0)
 
@@ -426,7 +426,7 @@ def _(bench):
 
 @claim("synchronous_reset", "flag")
 def _(bench):
-    """A share f of the intervals is longer by what is left of a frame: variance f / 3 - f^2 / 4 each."""
+    """A share f of the intervals is longer by the rest of a frame: variance f / 3 - f^2 / 4 each."""
     f = bench.p["fraction"]
     quiet = plain_camera((32, 32), electrons=0.0, spread=0.2)
     return walk_of_spikes(bench.film(0.3, 4000, quiet), 20), 0.5 + 40.0 * (f / 3.0 - f * f / 4.0), 0.015
@@ -444,7 +444,7 @@ def _(bench):
 
 @claim("crosstalk", "late")
 def _(bench):
-    """All of a kick counts: none of it makes a pixel fire, whose reset would take what is beyond the threshold."""
+    """All of a kick counts: none of it makes a pixel fire, whose reset would take the charge beyond the threshold."""
     kicks = 4.0 * (1.0 - 1 / 32) * bench.p["kick"]
     return bench.film(0.3, 8000).mean(), 0.3 / (1.0 - kicks), EDGE / 8000
 

@@ -1,4 +1,4 @@
-"""Each mechanism outside the catalogue does what it says."""
+"""Each mechanism outside the catalogue follows its law."""
 
 from __future__ import annotations
 
@@ -140,7 +140,7 @@ def test_saturation_leaves_a_memory():
 
 
 def test_distant_row_gets_the_kick():
-    """In the dark ten kicks of 0.11 make a spike: a reset takes what is beyond the threshold as well."""
+    """In the dark ten kicks of 0.11 make a spike: a reset takes the charge beyond the threshold as well."""
     light = np.zeros((1, 32, 32), np.float32)
     light[0, 4] = 0.5
     rate = filmed(CAMERA, Light(np.zeros(1), light), FRAMES, [hidden("distant_row_leak", kick=0.11, rows_away=20.0)])

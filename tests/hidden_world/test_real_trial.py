@@ -20,7 +20,7 @@ CANDIDATES, TWINS = ("dead_time", "vignetting"), 6
 
 @pytest.mark.slow
 def test_trial_runs_the_real_diagnosis_and_scores_it(tmp_path, monkeypatch, capsys):
-    """A camera with nothing hidden and a strong effect; what is checked is that it works, not how well."""
+    """A camera with nothing hidden and a strong effect; the test checks that it works, not how well."""
 
     def tiny(*options):
         return [replace(c, recipe=replace(c.recipe, shape=SHAPE, frames=FRAMES)) for c in chosen(*options)]

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from tests.hidden_world.bench import filmed, hidden, intervals, plain_camera, walk_of_spikes
+from tests.hidden_world.bench import filmed, hidden, intervals, near, plain_camera, walk_of_spikes
 from tests.hidden_world.light import Light
 from tests.hidden_world.unit import SWING_V
 from tests.hidden_world.waves import Clock, Flashes, Polygon, Pulses, Rise, Sine, SlewingClock, Square, Wave
@@ -15,11 +15,6 @@ from tests.hidden_world.waves import Clock, Flashes, Polygon, Pulses, Rise, Sine
 QUIET = plain_camera((32, 32), electrons=0.0, spread=0.0)
 LOOSE = plain_camera((32, 32), electrons=2e3, kappa=0.05, spread=0.1)
 """Pixels that keep no phase: the spikes of a frame are independent."""
-
-
-def near(value: float, expected: float, tolerance: float) -> None:
-    print(f"{value:.5g}, expected {expected:.5g} +- {tolerance:.2g}")
-    assert abs(value - expected) <= tolerance
 
 
 @pytest.mark.parametrize(
@@ -81,7 +76,7 @@ def test_light_that_swings_four_times_a_frame_is_its_integral():
 
 @pytest.mark.parametrize("frequency", [40e3, 17e3, 90e3])
 def test_flicker_is_integrated_over_the_frame(frequency):
-    """sin x / x of what is left after a frame; nothing at the frame rate."""
+    """sin x / x of the rest after a frame; nothing at the frame rate."""
     bits = filmed(LOOSE, 0.3, 4000, [hidden("light_flicker", modulation=0.5, frequency_hz=frequency)])
     cycles = frequency * 25e-6
     line = 2 * abs(np.mean((bits.mean(axis=(1, 2)) - 0.3) * np.exp(2j * np.pi * cycles * np.arange(4000))))
@@ -190,7 +185,7 @@ def test_a_kick_at_the_end_of_the_frame_shows_in_the_next():
 
 
 def test_kicks_at_once_give_their_charge():
-    """Less what of a kick is beyond the threshold, half of it, where it makes a pixel fire: a reset takes all."""
+    """Less the part of a kick beyond the threshold, half of it, where it makes a pixel fire: a reset takes all."""
     rate = filmed(plain_camera((32, 32)), 0.3, 2000, [hidden("crosstalk", kick=0.01)]).mean()
     kicks = 4 * (1 - 1 / 32)
     near(rate, 0.3 / (1 - kicks * 0.01 + kicks * 0.01**2 / 2), 5 * 0.6 / 2000 / 32)

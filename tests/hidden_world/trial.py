@@ -1,8 +1,8 @@
-"""Run a trial: generate, diagnose, keep what was said; then open the keys and score.
+"""Run a trial: generate, diagnose, keep the answers; then open the keys and score.
 
 A case that has a result is not run again, so that a trial can be stopped and gone on with.  Its campaign is deleted.
 
-    OUT/manifest.json, sealed/     see `keys`          OUT/results/ID.json   what was said of a case
+    OUT/manifest.json, sealed/     see `keys`          OUT/results/ID.json   the answer to a case
     OUT/trial.json, trial.md       the figures         OUT/campaigns/ID      only while it is at work, or with `keep`
 """
 
@@ -69,12 +69,12 @@ def run_trial(
     keep: bool = False,
     starting: Callable[[], AbstractContextManager[object]] = nullcontext,
 ) -> Iterator[tuple[int, int]]:
-    """Do what is not done yet; yields (done, all) as it goes on.  diagnose: `module:function`, see `Diagnose`.
+    """Do the missing cases; yields (done, all) as it goes on.  diagnose: `module:function`, see `Diagnose`.
 
-    jobs: cases at once.  threads: of each diagnosis.  starting: what is entered while their processes are started.
+    jobs: cases at once.  threads: of each diagnosis.  starting: a context in which their processes are started.
 
     Keys are sealed and their hashes published before the first diagnosis.  Cases go in the order of their ids, which is
-    that of no group: what a trial has done when it is cut short is a fair sample of it.
+    that of no group: the cases of a trial that is cut short are a fair sample.
     """
     (out / "results").mkdir(parents=True, exist_ok=True)
     seal(cases(which, part), out, {"set": which, "part": part})
@@ -106,7 +106,7 @@ def is_done(out: Path, case_id: str) -> bool:
 
 
 def run_case(case: Case, out: Path, diagnose: str, threads: int, keep: bool) -> None:
-    """Generate one campaign, have it diagnosed, and write down what was said; an exception is a result too."""
+    """Generate one campaign, have it diagnosed, and write down the answer; an exception is a result too."""
     campaign, work = out / "campaigns" / case.id, out / "diagnoses" / case.id
     began = time.perf_counter()
     write_campaign(case.recipe, campaign)
@@ -212,7 +212,7 @@ def as_text(trial: dict[str, Any]) -> str:
 
 
 def _hidden(scored: dict[str, Any]) -> str:
-    """What a case hides, far laws named."""
+    """The hidden effect of a case, far laws named."""
     laws = ", ".join(law for law in scored["laws"] if law)
     return f"{scored['what']} ({laws})" if laws else scored["what"]
 

@@ -1,6 +1,6 @@
 """Campaigns that are awkward: labels that lie, frames that are lost, recordings that are missing.
 
-`changed_plan` acts before anything is filmed, `changed_labels` on what is handed over.
+`changed_plan` acts before anything is filmed, `changed_labels` on the labels that are handed over.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from tests.hidden_world.light import Light, Shot
 
 @dataclass(frozen=True)
 class Trick:
-    """name, and what is done."""
+    """A trick: its name, and a description."""
 
     name: str
     what: str

@@ -60,7 +60,7 @@ PATTERNS: dict[str, Callable[[np.random.Generator, tuple[int, ...]], Array]] = {
 class Camera:
     """A unit.  gain, dark, quiet, kappa, per_mv: (rows, columns), as in `integrator.Physics`.
 
-    drawn: what this unit has, for its key.  phi_fc: (rows, columns) threshold [fC].
+    drawn: parameters of this unit, for its key.  phi_fc: (rows, columns) threshold [fC].
     """
 
     shape: tuple[int, int]

@@ -1,4 +1,4 @@
-"""What changes in continuous time, with its integral in closed form; times in frames.
+"""Changes in continuous time, with their integrals in closed form; times in frames.
 
 A wave has `value(t)` and `area(t)`, an antiderivative: whoever needs a mean over a stretch of time takes a difference,
 so that nothing is sampled, however fast the wave.

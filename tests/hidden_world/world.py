@@ -1,4 +1,4 @@
-"""A campaign of the hidden world from what is hidden in it: camera, light, integration, read-out, labels.
+"""A campaign of the hidden world from its hidden mechanisms: camera, light, integration, read-out, labels.
 
 A camera with a mechanism in one place only is filmed twice, with and without it, and each pixel taken from its film;
 a mechanism that starts on the way is switched on between two frames, the charge of every pixel going on.
@@ -45,7 +45,7 @@ class Recipe:
 
 
 def stream(seed: int, *names: object) -> np.random.Generator:
-    """A generator for each purpose, so that what is drawn for one changes nothing for another."""
+    """A generator for each purpose, so that the draws of one change nothing for another."""
     return np.random.default_rng([seed, *(zlib.crc32(str(name).encode()) for name in names)])
 
 
@@ -55,7 +55,7 @@ def law_of(hidden: Hidden) -> Law:
 
 
 def write_campaign(recipe: Recipe, folder: str | Path) -> dict[str, Any]:
-    """Write the campaign's folder; returns what was drawn for its camera.  The same recipe gives the same bytes."""
+    """Write the campaign's folder; returns the draws of its camera.  The same recipe gives the same bytes."""
     root = Path(folder)
     root.mkdir(parents=True, exist_ok=True)
     camera = draw_camera(recipe.base, recipe.shape, stream(recipe.seed, "unit"), recipe.reset_noise_times)
@@ -106,7 +106,7 @@ def _film(recipe: Recipe, camera: Camera, shot: Shot, hidden: Sequence[Hidden]) 
 
 
 def physics_of(recipe: Recipe, camera: Camera, shot: Shot, hidden: Sequence[Hidden]) -> Physics:
-    """What a recording goes through with these mechanisms."""
+    """The physics of a recording with these mechanisms."""
     light: Light = shot.light
     for h in hidden:
         law = law_of(h)

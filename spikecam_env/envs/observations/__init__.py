@@ -1,10 +1,11 @@
-"""Observations by name: what `obs=` of an environment may be."""
+"""Observations by name, for `obs=` of an environment."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from functools import partial
-from importlib import import_module
+from pkgutil import resolve_name
+from typing import Any
 
 from spikecam_env.envs.observations.blocks import Multibinary, Packed, Spikes, block_shape
 from spikecam_env.envs.observations.frame_camera import FrameCamera
@@ -12,6 +13,7 @@ from spikecam_env.envs.observations.intervals import ISI, TFI
 from spikecam_env.envs.observations.playback import TFP
 from spikecam_env.envs.observations.protocol import Blocks, CameraView, Observation, replaced, restarted, with_rows
 from spikecam_env.envs.observations.state import with_state, with_state_space
+from spikecam_env.envs.registration import OBSERVATIONS_ABOVE
 from spikecam_env.errors import InputError, shown, unknown_name
 from spikecam_env.renamed import old_names
 
@@ -37,9 +39,9 @@ __all__ = [
 ]
 
 
-def _denoised(white: float = 1.0) -> Observation:
-    """Imported when first asked for: torch takes seconds, and the denoiser lies above the environments."""
-    law: Observation = import_module("denoiser.observation").Rate(white=white)
+def _of_place(place: str, keywords: dict[str, Any]) -> Observation:
+    """The observation of a package above, which is imported now: torch takes seconds."""
+    law: Observation = resolve_name(place)(**keywords)
     return law
 
 
@@ -50,15 +52,18 @@ OBSERVATIONS: dict[str, Callable[[], Observation]] = {
     "tfp": TFP,
     "tfi": TFI,
     "isi": ISI,
-    "rate": _denoised,
-    "dim_rate": partial(_denoised, white=0.1),
+    **{name: partial(_of_place, place, keywords) for name, (place, keywords) in OBSERVATIONS_ABOVE.items()},
     "frame30": partial(FrameCamera, 30.0),
     "frame1000": partial(FrameCamera, 1000.0),
 }
 
 
 def observation(obs: str | Observation) -> Observation:
-    """The observation of this name, or the one that was given; raises InputError for anything else."""
+    """The observation of this name, or the one that was given.
+
+    Raises:
+        InputError: for anything else.
+    """
     if isinstance(obs, Observation):
         return obs
     if not isinstance(obs, str):

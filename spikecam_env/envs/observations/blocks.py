@@ -18,7 +18,7 @@ def block_shape(space: spaces.Space[Any]) -> tuple[int, int, int]:
     """(frames, rows, columns) of the spike blocks that fill a space.
 
     Raises:
-        InputError: For a space of anything else: packed spikes, pictures, numbers that are not 0 or 1.
+        InputError: for a space of anything else: packed spikes, pictures, numbers that are not 0 or 1.
     """
     shape = space.shape
     grey = isinstance(space, spaces.Box) and float(np.max(space.high, initial=0)) > 1

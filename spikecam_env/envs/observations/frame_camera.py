@@ -4,7 +4,7 @@
 
 Exposure j is over [j P, j P + E), P the frame period and E the exposure time, from the episode's beginning on.  Agents
 see the last whole exposure, black before the first.  No noise but the eight bits; light above `white` is cut.  The mean
-is exact (`sensor.between_keys`), so what moves is blurred as it is in such a camera.
+is exact (`sensor.between_keys`), so motion is blurred as in such a camera.
 """
 
 from __future__ import annotations
@@ -26,29 +26,32 @@ from spikecam_env.sensor.between_keys import key_weights
 
 
 class Shutter(NamedTuple):
-    """collected: (N, H, W) float64, light of the exposure under way [mean light * frames].  picture: (N, 1, H, W).
-
-    end: (N,) frame at which its exposure ended, -1 before the first.  now: (N,) frame up to which light was collected.
-    """
+    """The exposure under way of every stream, and the last whole one."""
 
     collected: NDArray[np.float64]
+    """(N, H, W), light of the exposure under way [mean light * frames]."""
     picture: NDArray[np.uint8]
+    """(N, 1, H, W), the last whole exposure."""
     end: NDArray[np.float64]
+    """(N,) frame at which that exposure ended; -1 before the first."""
     now: NDArray[np.float64]
+    """(N,) frame up to which light was collected."""
 
 
 @dataclass(frozen=True)
 class FrameCamera(Observation):
     """(1, H, W) uint8 of a camera with `rate_hz` frames a second.
 
-    exposure_s: of a frame; None is the whole period.  white: light that gives 255.
-    Raises InputError for a rate, an exposure or a white that is not above 0, for an exposure longer than the period,
-    and in `step` where the light is not known.
+    Raises:
+        InputError: for a rate, an exposure or a white that is not above 0, for an exposure longer than the period, and
+            in `step` where the light is not known.
     """
 
     rate_hz: float
     exposure_s: float | None = field(default=None, kw_only=True)
+    """Exposure of a frame [s]; None is the whole period."""
     white: float = field(default=1.0, kw_only=True)
+    """Light that gives 255."""
 
     def __post_init__(self) -> None:
         checked_number(self.rate_hz, "rate_hz", 0.0, above=True, unit="Hz")
@@ -75,12 +78,12 @@ class FrameCamera(Observation):
         after = Shutter._make(array.copy() for array in state)
         for own, light in zip(_streams(after), blocks.light, strict=True):
             start, stop = float(own.now), float(own.now) + blocks.spikes.shape[1]
-            for opened, closed, whole in shutter_open(start, stop, period, exposure):
-                own.collected[:] += (closed - opened) * mean_light(light, opened, closed)
+            for begin, end, whole in shutter_open(start, stop, period, exposure):
+                own.collected[:] += (end - begin) * mean_light(light, begin, end)
                 if whole:
                     own.picture[0] = grey(own.collected / (exposure * self.white))
                     own.collected[:] = 0.0
-                    own.end[...] = closed
+                    own.end[...] = end
             own.now[...] = stop
         return after.picture.copy(), after
 

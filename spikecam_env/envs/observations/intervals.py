@@ -24,10 +24,12 @@ LONGEST = 1 << 24
 
 
 class Waiting(NamedTuple):
-    """since: (N, H, W) int32, frames since the last spike.  interval: (N, H, W) int32, the last whole one, or 0."""
+    """The interval under way of every pixel, and the one before."""
 
     since: NDArray[np.int32]
+    """(N, H, W) int32, frames since the last spike."""
     interval: NDArray[np.int32]
+    """(N, H, W) int32, the last whole interval [frames]; 0 before the first."""
 
 
 def waiting(view: CameraView, streams: int) -> Waiting:

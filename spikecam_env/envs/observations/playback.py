@@ -2,7 +2,7 @@
 
     picture = 255 * spikes in the last `window` frames / frames seen of them          [spikes/frame]
 
-Smooth; blurs what moves within the window.  Source: Zhu et al., ICME 2019 (`streams.pictures`).
+Smooth; blurs motion within the window.  Source: Zhu et al., ICME 2019 (`streams.pictures`).
 """
 
 from __future__ import annotations
@@ -21,21 +21,24 @@ from spikecam_env.errors import InputError
 
 
 class RecentFrames(NamedTuple):
-    """frames: (N, window - K, H, W) the last frames, those of before the episode 0.  seen: (N,) frames, to `window`."""
+    """The last frames of every stream."""
 
     frames: NDArray[np.uint8]
+    """(N, window - K, H, W), the last frames; those before the episode are 0."""
     seen: NDArray[np.int64]
+    """(N,) frames so far, up to `window`."""
 
 
 @dataclass(frozen=True)
 class TFP(Observation):
     """(1, H, W) uint8: 255 where a pixel fires in every frame.
 
-    window: frames; None is the step's own block.  Raises InputError for a window below 1, and of more than the step's
-    own block on a device.
+    Raises:
+        InputError: for a window below 1, and on a device for one longer than the step's own block.
     """
 
     window: int | None = None
+    """Frames; None is the step's own block."""
 
     takes_tensors = True
 
@@ -66,7 +69,7 @@ class TFP(Observation):
 
 
 def looked_up(spikes: NDArray[np.uint8], levels: NDArray[np.uint8]) -> NDArray[np.uint8]:
-    """Pictures (N, 1, H, W) of blocks (N, K, H, W): of each pixel what levels (N, K + 1) say of so many spikes."""
+    """Pictures (N, 1, H, W) of blocks (N, K, H, W): the level, of (N, K + 1), of each pixel's number of spikes."""
     streams, frames, rows, columns = spikes.shape
     pictures = np.empty((streams, 1, rows, columns), np.uint8)
     _look_up(np.ascontiguousarray(spikes).reshape(streams, frames, -1), levels, pictures.reshape(streams, -1))
@@ -75,8 +78,7 @@ def looked_up(spikes: NDArray[np.uint8], levels: NDArray[np.uint8]) -> NDArray[n
 
 @njit(cache=True, nogil=True)
 def _look_up(spikes: NDArray[np.uint8], levels: NDArray[np.uint8], pictures: NDArray[np.uint8]) -> None:
-    """spikes (N, K, P); pictures (N, P).  Sums of up to 255 frames fit in bytes, which are added faster than numpy adds
-    them, as numbers of 32 bits."""
+    """Pictures (N, P) of spikes (N, K, P).  Sums of up to 255 frames fit in bytes, which are added faster."""
     streams, frames, pixels = spikes.shape
     few, total = np.empty(pixels, np.uint8), np.empty(pixels, np.int32)
     for n in range(streams):

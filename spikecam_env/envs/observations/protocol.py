@@ -1,4 +1,4 @@
-"""What an observation is: a law from the blocks that cameras exposed, and what it remembers, to what agents see.
+"""An observation: a law that makes the pictures of agents from the blocks that cameras exposed, and from its memory.
 
     step(blocks, state) -> (picture, state)
 
@@ -21,43 +21,36 @@ from spikecam_env.renamed import old_names
 from spikecam_env.sensor import Keyframes
 from spikecam_env.types import Masks
 
-"""(N,) which of the streams."""
-
 
 @dataclass(frozen=True)
 class CameraView:
-    """The camera that agents look through: shape (rows, columns), K frames a step, frames a second.
-
-    device: the torch device that its blocks are tensors on; None: they are arrays.
-    """
+    """The camera that agents look through."""
 
     shape: tuple[int, int]
+    """(rows, columns)."""
     frames_per_step: int
+    """K, frames a step."""
     frame_rate_hz: float = 40_000.0
     device: Any = None
+    """Torch device that its blocks are tensors on; None where they are arrays."""
 
 
 @dataclass(frozen=True)
 class Blocks:
-    """What N cameras exposed in one step.
-
-    spikes: (N, K, H, W) uint8 or int8, 0 and 1; a torch tensor for an observation that takes tensors.
-    light: N, what fell on each sensor, on the frames of its episode; empty where nobody knows.
-    frame_rate_hz: of the spike cameras.
-    """
+    """The blocks that N cameras exposed in one step."""
 
     spikes: NDArray[Any]
+    """(N, K, H, W) uint8 or int8, 0 and 1; a torch tensor for an observation that takes tensors."""
     light: Sequence[Keyframes | ArrayLike] = ()
+    """N, the light on each sensor, on the frames of its episode; empty where it is not known."""
     frame_rate_hz: float = 40_000.0
 
 
 class Observation(ABC):
-    """A law of what agents see; parameters are the fields of a frozen dataclass.
-
-    takes_tensors: whether blocks may be tensors; what agents see then is one.
-    """
+    """A law of the pictures that agents see; parameters are the fields of a frozen dataclass."""
 
     takes_tensors: ClassVar[bool] = False
+    """Whether blocks may be tensors; the picture is then one too."""
 
     begins_alone: ClassVar[bool] = True
     """Whether a stream on a device may begin anew between two blocks of the others."""
@@ -72,13 +65,10 @@ class Observation(ABC):
 
     @abstractmethod
     def step(self, blocks: Blocks, state: Any) -> tuple[NDArray[Any], Any]:
-        """(what agents see (N, ...), the state after these blocks); arrays of the state before stay as they were."""
+        """(pictures (N, ...), the state after these blocks); arrays of the state before stay as they were."""
 
     def age(self, state: Any) -> NDArray[np.float64] | float:
-        """(N,) frames since the newest light in the picture was collected; -1 where there has been no valid picture.
-
-        0 where every picture holds the step's last frame.
-        """
+        """(N,) age of the newest light in the picture [frames]; -1 before the first valid picture."""
         return 0.0
 
 
@@ -90,16 +80,7 @@ def restarted(law: Observation, view: CameraView, state: Any, which: Masks) -> A
 
 
 def replaced(state: Any, others: Any, which: Masks) -> Any:
-    """A state in which other streams take the place of some.
-
-    Args:
-        state: of N streams.
-        others: the state of as many streams as `which` selects, or of one that takes every place.
-        which: (N,).
-
-    Returns:
-        The state of N streams; arrays of the one before stay as they were.
-    """
+    """A state in which other streams, or one, take the place of those selected; the arrays of `state` stay."""
     if hasattr(state, "replaced"):
         return state.replaced(others, which)
     arrays = [with_rows(now, other, which) for now, other in zip(state, others, strict=True)]
@@ -107,15 +88,12 @@ def replaced(state: Any, others: Any, which: Masks) -> Any:
 
 
 def with_rows(values: Any, rows: Any, which: Masks) -> Any:
-    """Values of N streams with others in the place of some.
+    """A copy of values of N streams with others in the place of some.
 
     Args:
         values: an array or tensor (N, ...), or a dictionary of such.
         rows: the same of as many streams as `which` selects, or of one that takes every place.
         which: (N,).
-
-    Returns:
-        A copy.
 
     Example:
         >>> with_rows(np.zeros(3), np.array([7.0]), np.array([False, True, False])).tolist()

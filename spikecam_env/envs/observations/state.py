@@ -1,4 +1,4 @@
-"""What agents may know besides the picture: where they look, and how old the picture is."""
+"""The gaze and the age of the picture, which agents may observe beside it."""
 
 from __future__ import annotations
 
@@ -13,8 +13,12 @@ from spikecam_env.checked import LARGEST_COUNT
 
 
 def with_state_space(picture: spaces.Space[Any]) -> spaces.Dict:
-    """picture; gaze (2,) float32, (pan, tilt) [pixels] at the end of the step; age (1,) float32 [frames] since the
-    newest light in the picture was collected, -1 where there has been no valid picture."""
+    """The space of a picture with gaze and age.
+
+    Returns:
+        picture; gaze (2,) float32, (pan, tilt) [pixels] at the end of the step; age (1,) float32 [frames] of the newest
+        light in the picture, -1 before the first valid picture.
+    """
     gaze = spaces.Box(-MOST_PLACE, MOST_PLACE, (2,), np.float32)
     age = spaces.Box(-1.0, float(LARGEST_COUNT), (1,), np.float32)
     return spaces.Dict({"picture": picture, "gaze": gaze, "age": age})

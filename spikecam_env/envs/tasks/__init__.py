@@ -5,6 +5,8 @@ A task is a frozen dataclass (`base.Task`) whose `draw` gives an episode; `env.T
 
 from __future__ import annotations
 
+from dataclasses import fields
+
 from spikecam_env.envs.tasks.base import Task
 from spikecam_env.envs.tasks.catch import Catch
 from spikecam_env.envs.tasks.exposure import Exposure
@@ -25,3 +27,11 @@ TASKS: dict[str, type[Task]] = {
     "LowLight": LowLight,
     "Exposure": Exposure,
 }
+
+
+def whose_number(name: str) -> str:
+    """A hint for a keyword that is a number of tasks; nothing for others."""
+    of = [task for task, kind in TASKS.items() if name in (field.name for field in fields(kind))]
+    if not of:
+        return ""
+    return f"it is a number of tasks ({', '.join(of)}): TaskEnv({of[0]}({name}=...)), or make(id, task={of[0]}(...))"

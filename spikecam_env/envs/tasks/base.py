@@ -1,4 +1,4 @@
-"""What a task is: the motor, the time, the action's numbers, and how an episode is drawn."""
+"""A task: the motor, the time, the action's numbers, and how an episode is drawn."""
 
 from __future__ import annotations
 
@@ -13,19 +13,19 @@ from spikecam_env.renamed import old_names
 
 @dataclass(frozen=True)
 class CameraUnits:
-    """What a task knows of the camera that plays it: units to turn sides and seconds into pixels and frames.
+    """The camera that plays a task: units that turn sides and seconds into pixels and frames.
 
-    pictures  numbers of the textures that this split may show (`tasks.things`)
-
-    >>> view = View((64, 64), 40_000.0, frames_per_step=40, pictures=range(1))
-    >>> view.steps(0.5), view.middle
-    (500, (31.5, 31.5))
+    Example:
+        >>> view = CameraUnits((64, 64), 40_000.0, frames_per_step=40, pictures=range(1))
+        >>> view.steps(0.5), view.middle
+        (500, (31.5, 31.5))
     """
 
     shape: tuple[int, int]
     frame_rate_hz: float
     frames_per_step: int
     pictures: range
+    """Numbers of the textures that this split may show (`tasks.things`)."""
 
     @property
     def side(self) -> float:
@@ -64,7 +64,7 @@ class Task:
 
     Example:
         >>> from spikecam_env.envs.tasks import TASKS
-        >>> view = View((64, 64), 40_000.0, frames_per_step=40, pictures=range(1))
+        >>> view = CameraUnits((64, 64), 40_000.0, frames_per_step=40, pictures=range(1))
         >>> TASKS["Track"]().draw(np.random.default_rng(0), view).steps
         500
     """
@@ -95,7 +95,7 @@ class Task:
         raise NotImplementedError
 
     def common(self, view: CameraUnits) -> dict[str, Any]:
-        """What every `Episode` of the task is made with, scene and target apart."""
+        """Keywords of every `Episode` of the task, scene and target apart."""
         return {"success_px": self.success_side * view.side, "steps": view.steps(self.duration_s)}
 
 

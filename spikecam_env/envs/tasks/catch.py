@@ -88,9 +88,10 @@ LINE_SIDES = 1 / 64
 
 @dataclass(frozen=True, eq=False)
 class Meeting(Episode):
-    """crossing: (x in an unmoved picture [pixels], frame)."""
+    """An episode that ends when the ball crosses the line."""
 
     crossing: tuple[float, float] = (0.0, 0.0)
+    """(x in an unmoved picture [pixels], frame)."""
 
     def aim(self, frame: float, gaze: Gaze) -> tuple[float, float]:
         """Where the ball crosses, as seen now; from then on, as it was seen then."""

@@ -29,24 +29,26 @@ SPLITS: dict[str, tuple[range, range]] = {
 class TaskEnv(AimingEnv):
     """Plays a task; reward, end and info as of `AimingEnv`.  The observation is "tfp" where `obs` says nothing else.
 
-    task               a name of `tasks.TASKS`, or a `Task`, e.g. `LowLight(mean_interval=(50, 50))`
-    shape              (rows, columns)
-    split              "train" or "test", of the episodes that `reset` draws
-    reward             "progress" or "distance"
-    frames_per_step    default the task's
-    camera             keywords of `AimingEnv` and `SpikeCameraEnv`
-
-    Options of reset: split, as above, for this episode; episode, its number within the split (train: 0 to 999 999,
-    test: 0 to 999), instead of one drawn from the split.  The camera's unit and noise follow from the seed, not from
-    the number.
-    Info: episode_number, which `episode` takes; `episode` would be in the way of wrappers and learners, which keep
-    statistics under that name.
     `spec.max_episode_steps` is `most_steps`; the task's time is `Task.duration_s`, whatever `frames_per_step` is.
 
-    >>> env = TaskEnv("Track", shape=(32, 32), split="test")
-    >>> picture, info = env.reset(seed=0, options={"episode": 3})
-    >>> picture.shape, info["episode_number"], env.most_steps
-    ((1, 32, 32), 3, 500)
+    Options: split, for this episode; episode, its number within the split (train: 0 to 999 999, test: 0 to 999),
+        instead of one drawn from the split. The camera's unit and noise follow from the seed, not from the number.
+    Info: episode_number, which the option `episode` takes (learners keep statistics under the name `episode`).
+
+    Args:
+        task: a name of `tasks.TASKS`, or a `Task`, e.g. `LowLight(mean_interval=(50, 50))`.
+        shape: (rows, columns).
+        split: "train" or "test", of the episodes that `reset` draws.
+        reward: "progress" or "distance".
+        frames_per_step: default the task's.
+        max_gaze_rate_px_s: default the task's.
+        camera: keywords of `AimingEnv` and `SpikeCameraEnv`.
+
+    Example:
+        >>> env = TaskEnv("Track", shape=(32, 32), split="test")
+        >>> picture, info = env.reset(seed=0, options={"episode": 3})
+        >>> picture.shape, info["episode_number"], env.most_steps
+        ((1, 32, 32), 3, 500)
     """
 
     usual_obs: ClassVar[str] = "tfp"
@@ -88,7 +90,7 @@ class TaskEnv(AimingEnv):
 
     @property
     def spec(self) -> EnvSpec | None:
-        """What `gymnasium.make` made this of, with the task's own number of steps: learners ask it for the horizon."""
+        """Specification by `gymnasium.make`, with the task's own number of steps, which learners need."""
         return self._spec
 
     @spec.setter

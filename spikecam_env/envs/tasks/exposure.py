@@ -3,7 +3,7 @@
     log10(ambient(t)) = swing sin(2 pi t / period + phase),   light on the sensor = scene * ambient * iris
     log10(iris) changes by the action's third number * iris_decades_s                               [1/s]
 
-On the target: it is looked at, and the light on the sensor is within `tolerance` of what the scene is made for.
+On the target: the camera looks at it, and the light on the sensor is within `tolerance` of the scene's own light.
 """
 
 from __future__ import annotations
@@ -89,7 +89,7 @@ class Iris:
 
 @dataclass(frozen=True)
 class Dimmed(Derived):
-    """Scene: another one's light times 10 ^ law(frame); law: `Ambient` or `Iris`."""
+    """Another scene in a light of 10 ^ law(frame)."""
 
     scene: Placed
     law: Ambient | Iris
@@ -112,12 +112,16 @@ class Dimmed(Derived):
 
 @dataclass(frozen=True, eq=False)
 class Lit(Episode):
-    """rate: of the iris [decades/frame]; tolerance, most: [decades]; iris: of the step."""
+    """An episode under a changing light, with an iris."""
 
     rate: float = 0.0
+    """Top rate of the iris [decades/frame]."""
     tolerance: float = 0.0
+    """Light that is off by this much is well exposed [decades]."""
     most: float = 0.0
+    """Half the range of the iris [decades]."""
     iris: Iris = Iris()
+    """Iris of the step."""
 
     def acted(self, rest: tuple[float, ...], standing: Standing, stop: int) -> Lit:
         """With the iris on its way."""

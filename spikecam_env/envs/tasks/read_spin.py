@@ -107,7 +107,7 @@ class ReadSpinEpisode(Episode):
         return self.is_right
 
     def performance(self, standing: Standing) -> float:
-        """Of a success, the share of the time that is left; less what wrong answers cost."""
+        """Of a success, the share of the time that is left; less the cost of wrong answers."""
         return float(self.is_right) * (1 - standing.step / self.steps) - self._cost
 
     @property

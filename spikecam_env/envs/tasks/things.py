@@ -1,4 +1,4 @@
-"""What the tasks show: textured discs, backgrounds, and paths that turn and bounce.
+"""Things that the tasks show: textured discs, backgrounds, and paths that turn and bounce.
 
 A texture has a number; its light follows from the number, so that train and test show different ones.
 """
@@ -26,8 +26,8 @@ BACKGROUND = (0.05, 0.2)
 TEXTURE_SIZE = 128
 """Texels of a texture's side: one a pixel, on the largest disc (`ReadDigit`) at 250 x 400."""
 BLUR_PX = 1.5
-"""Standard deviation of the blur of the background [pixels]: what is left is wider than a pixel, so that it moves
-smoothly."""
+"""Standard deviation of the blur of the background [pixels]: it leaves nothing finer than a pixel, so that motion is
+smooth."""
 TRAIN_PICTURES, TEST_PICTURES = range(64), range(64, 128)
 """Numbers of textures: no texture of a test is seen in training."""
 
@@ -55,7 +55,13 @@ def wander(
 ) -> PiecewisePath:
     """A path at one speed whose heading turns at random and that bounces inside a box about the picture's middle.
 
-    sides_s  speed [shorter sides/s];  room  from the middle to the box's walls [shorter sides]
+    Args:
+        rng: draws the turns.
+        view: of the camera.
+        start: (x, y) of the beginning [pixels].
+        sides_s: speed [shorter sides/s].
+        seconds: length of the path.
+        room: from the middle to the box's walls [shorter sides].
     """
     count = max(2, round(seconds / PIECE_S))
     turns = np.cumsum(rng.normal(0.0, TURN * np.sqrt(PIECE_S), count)) + rng.uniform(0, 2 * np.pi)

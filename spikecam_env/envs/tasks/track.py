@@ -39,7 +39,7 @@ class Track(Task):
         return Episode(self.plane(rng, view), "target", **self.common(view))
 
     def plane(self, rng: np.random.Generator, view: CameraUnits) -> Discs:
-        """The target and what is behind it."""
+        """The target before its background."""
         speed = self.top_sides_s * rng.uniform(*self.speed)
         path = wander(rng, view, view.beside_middle(rng, *self.start), speed, self.duration_s, self.room)
         target = disc_of("islands", number_of(rng, view), self.radius * view.side, path)

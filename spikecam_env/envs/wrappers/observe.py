@@ -26,16 +26,22 @@ from spikecam_env.sensor import Keyframes
 
 
 class ObserveSpikes(gymnasium.ObservationWrapper, gymnasium.utils.RecordConstructorArgs):
-    """Blocks of spikes (K, H, W) become what `obs` names.
+    """Blocks of spikes (K, H, W) become another observation.
 
-    Errors: InputError for an unknown observation and for an environment that gives no blocks of spikes; NotReadyError
-    for a step before the first reset.
+    Args:
+        env: gives blocks of spikes.
+        obs: name of an observation, or an `Observation`.
 
-    >>> from spikecam_env.envs.rotating_disk import RotatingDiskEnv
-    >>> env = ObserveSpikes(RotatingDiskEnv(shape=(16, 24)), "tfp")
-    >>> picture, info = env.reset(seed=0)
-    >>> picture.shape, picture.dtype
-    ((1, 16, 24), dtype('uint8'))
+    Raises:
+        InputError: for an unknown observation and for an environment that gives no blocks of spikes.
+        NotReadyError: for a step before the first reset.
+
+    Example:
+        >>> from spikecam_env.envs.rotating_disk import RotatingDiskEnv
+        >>> env = ObserveSpikes(RotatingDiskEnv(shape=(16, 24)), "tfp")
+        >>> picture, info = env.reset(seed=0)
+        >>> picture.shape, picture.dtype
+        ((1, 16, 24), dtype('uint8'))
     """
 
     def __init__(self, env: gymnasium.Env, obs: str | Observation) -> None:
@@ -50,7 +56,7 @@ class ObserveSpikes(gymnasium.ObservationWrapper, gymnasium.utils.RecordConstruc
         return super().reset(seed=seed, options=options)
 
     def observation(self, observation: NDArray[Any]) -> Any:
-        """What is seen of a block."""
+        """The observation of a block."""
         if self._state is None:
             raise NotReadyError("the environment has not begun; call reset first")
         blocks = Blocks(observation[None], light_on(self.env), self._view.frame_rate_hz)
@@ -61,12 +67,13 @@ class ObserveSpikes(gymnasium.ObservationWrapper, gymnasium.utils.RecordConstruc
 class VectorObserveSpikes(gymnasium.vector.VectorObservationWrapper):
     """The same of a vector environment with NEXT_STEP autoreset, whose N streams are seen in one call.
 
-    >>> from spikecam_env.envs.rotating_disk import RotatingDiskEnv
-    >>> from spikecam_env.envs.vector import SpikeCameraVectorEnv
-    >>> cameras = VectorObserveSpikes(SpikeCameraVectorEnv(RotatingDiskEnv, 2, shape=(16, 24)), "tfp")
-    >>> cameras.reset(seed=0)[0].shape
-    (2, 1, 16, 24)
-    >>> cameras.close()
+    Example:
+        >>> from spikecam_env.envs.rotating_disk import RotatingDiskEnv
+        >>> from spikecam_env.envs.vector import SpikeCameraVectorEnv
+        >>> cameras = VectorObserveSpikes(SpikeCameraVectorEnv(RotatingDiskEnv, 2, shape=(16, 24)), "tfp")
+        >>> cameras.reset(seed=0)[0].shape
+        (2, 1, 16, 24)
+        >>> cameras.close()
     """
 
     def __init__(self, env: gymnasium.vector.VectorEnv, obs: str | Observation) -> None:
@@ -92,7 +99,7 @@ class VectorObserveSpikes(gymnasium.vector.VectorObservationWrapper):
         return result
 
     def observations(self, observations: NDArray[Any]) -> Any:
-        """What is seen of the blocks (N, K, H, W)."""
+        """The observations of blocks (N, K, H, W)."""
         if self._state is None:
             raise NotReadyError("the environments have not begun; call reset first")
         blocks = Blocks(observations, frame_rate_hz=self._view.frame_rate_hz)
@@ -101,7 +108,11 @@ class VectorObserveSpikes(gymnasium.vector.VectorObservationWrapper):
 
 
 def viewed(space: spaces.Space[Any], env: Any) -> CameraView:
-    """The camera whose blocks fill a space; raises InputError where they are no blocks of spikes."""
+    """The camera whose blocks fill a space.
+
+    Raises:
+        InputError: where they are no blocks of spikes.
+    """
     frames, rows, columns = block_shape(space)
     one = getattr(env.unwrapped, "envs", [env])[0].unwrapped
     rate = one.model.frame_rate_hz if isinstance(one, SpikeCameraEnv) else CameraView.frame_rate_hz
@@ -109,6 +120,6 @@ def viewed(space: spaces.Space[Any], env: Any) -> CameraView:
 
 
 def light_on(env: gymnasium.Env) -> tuple[Keyframes | ArrayLike, ...]:
-    """What fell on the sensor in the last step, or nothing where the environment is no spike camera."""
+    """The light on the sensor in the last step; empty where the environment is no spike camera."""
     one = env.unwrapped
     return tuple(one.blocks.light) if isinstance(one, SpikeCameraEnv) else ()

@@ -3,7 +3,7 @@
     progress_t = PROGRESS (r_t - r_(t-1));  0 in the first step of an episode
 
 Where a reward says how near the goal is, standing still near it pays as much as reaching it from afar, and little is
-learned; progress pays for what an action did.  Its sum over an episode is PROGRESS times the reward won.
+learned; progress pays for the effect of an action.  Its sum over an episode is PROGRESS times the reward won.
 """
 
 from __future__ import annotations
@@ -28,11 +28,12 @@ def progress(reward: ArrayLike, before: ArrayLike) -> NDArray[np.float64]:
 class ProgressReward(gymnasium.Wrapper, gymnasium.utils.RecordConstructorArgs):
     """`progress` in place of the reward.
 
-    >>> from spikecam_env.envs.rotating_disk import RotatingDiskEnv
-    >>> env = ProgressReward(RotatingDiskEnv(shape=(16, 24)))
-    >>> spikes, info = env.reset(seed=0)
-    >>> env.step(np.zeros(2))[1]
-    0.0
+    Example:
+        >>> from spikecam_env.envs.rotating_disk import RotatingDiskEnv
+        >>> env = ProgressReward(RotatingDiskEnv(shape=(16, 24)))
+        >>> spikes, info = env.reset(seed=0)
+        >>> env.step(np.zeros(2))[1]
+        0.0
     """
 
     def __init__(self, env: gymnasium.Env) -> None:
@@ -55,13 +56,14 @@ class ProgressReward(gymnasium.Wrapper, gymnasium.utils.RecordConstructorArgs):
 class VectorProgressReward(gymnasium.vector.VectorWrapper):
     """The same of a vector environment with NEXT_STEP autoreset: 0 in the step that begins an episode, too.
 
-    >>> from spikecam_env.envs.rotating_disk import RotatingDiskEnv
-    >>> from spikecam_env.envs.vector import SpikeCameraVectorEnv
-    >>> cameras = VectorProgressReward(SpikeCameraVectorEnv(RotatingDiskEnv, 2, shape=(16, 24)))
-    >>> spikes, infos = cameras.reset(seed=0)
-    >>> cameras.step(np.zeros((2, 2)))[1].tolist()
-    [0.0, 0.0]
-    >>> cameras.close()
+    Example:
+        >>> from spikecam_env.envs.rotating_disk import RotatingDiskEnv
+        >>> from spikecam_env.envs.vector import SpikeCameraVectorEnv
+        >>> cameras = VectorProgressReward(SpikeCameraVectorEnv(RotatingDiskEnv, 2, shape=(16, 24)))
+        >>> spikes, infos = cameras.reset(seed=0)
+        >>> cameras.step(np.zeros((2, 2)))[1].tolist()
+        [0.0, 0.0]
+        >>> cameras.close()
     """
 
     def __init__(self, env: gymnasium.vector.VectorEnv) -> None:

@@ -3,7 +3,7 @@
     env = RandomizeSensor(env, {"dead_time.tau_us": (0.0, 2.0), "reset_noise.temperature_K": (280.0, 330.0)})
     env = RandomizeLight(env, (0.1, 1.0))
 
-What is drawn is a function of the seed of `reset` alone; without one the draws go on.
+The draws follow from the seed of `reset` alone; without one they go on.
 """
 
 from __future__ import annotations
@@ -38,7 +38,7 @@ class _Randomize(gymnasium.Wrapper):
         self._rng = np.random.default_rng()
 
     def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[Any, dict[str, Any]]:
-        """A new episode with what is drawn, or with what `options` say."""
+        """A new episode with the drawn option, or with the one in `options`."""
         if seed is not None:
             self._rng = generator(seed, f"randomized {self.option}")
         drawn = self._draw(self._rng)
@@ -51,14 +51,21 @@ class _Randomize(gymnasium.Wrapper):
 class RandomizeSensor(_Randomize, gymnasium.utils.RecordConstructorArgs):
     """In every episode the environment's model with other parameters, each drawn evenly from its range.
 
-    ranges: see `Ranges`.  An effect that the model does not have is added, its other parameters as they are by default.
-    Errors: InputError for an unknown effect or parameter, one that is no number, and a range outside its bounds.
+    An effect that the model does not have is added, its other parameters as they are by default.
 
-    >>> from spikecam_env.envs.rotating_disk import RotatingDiskEnv
-    >>> env = RandomizeSensor(RotatingDiskEnv(shape=(16, 24)), {"dead_time.tau_us": (0.1, 2.0)})
-    >>> spikes, info = env.reset(seed=0)
-    >>> [effect.name for effect in env.unwrapped.sensor.model.effects if effect not in env.unwrapped.model.effects]
-    ['dead_time']
+    Args:
+        env: a spike camera's.
+        ranges: see `Ranges`.
+
+    Raises:
+        InputError: for an unknown effect or parameter, one that is no number, and a range outside its bounds.
+
+    Example:
+        >>> from spikecam_env.envs.rotating_disk import RotatingDiskEnv
+        >>> env = RandomizeSensor(RotatingDiskEnv(shape=(16, 24)), {"dead_time.tau_us": (0.1, 2.0)})
+        >>> spikes, info = env.reset(seed=0)
+        >>> [effect.name for effect in env.unwrapped.sensor.model.effects if effect not in env.unwrapped.model.effects]
+        ['dead_time']
     """
 
     option = "model"
@@ -78,13 +85,19 @@ class RandomizeSensor(_Randomize, gymnasium.utils.RecordConstructorArgs):
 class RandomizeLight(_Randomize, gymnasium.utils.RecordConstructorArgs):
     """In every episode the scene's light times a factor, whose logarithm is drawn evenly.
 
-    limits: lowest and highest factor, above 0.  Raises InputError for others.
+    Args:
+        env: a spike camera's.
+        limits: lowest and highest factor, above 0.
 
-    >>> from spikecam_env.envs.rotating_disk import RotatingDiskEnv
-    >>> env = RandomizeLight(RotatingDiskEnv(shape=(16, 24)), limits=(0.1, 1.0))
-    >>> bright, dim = (int(env.reset(seed=seed)[0].sum()) for seed in (0, 1))  # spikes of the first frames
-    >>> bright > 2 * dim
-    True
+    Raises:
+        InputError: for other limits.
+
+    Example:
+        >>> from spikecam_env.envs.rotating_disk import RotatingDiskEnv
+        >>> env = RandomizeLight(RotatingDiskEnv(shape=(16, 24)), limits=(0.1, 1.0))
+        >>> bright, dim = (int(env.reset(seed=seed)[0].sum()) for seed in (0, 1))  # spikes of the first frames
+        >>> bright > 2 * dim
+        True
     """
 
     option = "light"
@@ -120,7 +133,11 @@ def with_parameters(model: SensorModel, values: Mapping[str, float]) -> SensorMo
 
 
 def checked_range(name: str, limits: Any) -> tuple[float, float]:
-    """(low, high); raises InputError unless they are two finite numbers in this order."""
+    """(low, high) of a range.
+
+    Raises:
+        InputError: unless they are two finite numbers in this order.
+    """
     try:
         low, high = limits
     except (TypeError, ValueError) as error:

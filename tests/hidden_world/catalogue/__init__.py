@@ -1,6 +1,6 @@
 """The effects that a diagnosis knows by name, each written anew from its one-line description, a stage a file.
 
-Each has a `near` law, which is what the description says plainly, and `far` ones: other forms that textbooks have of
+Each has a `near` law, the plain sense of the description, and `far` ones: other forms that textbooks have of
 the same thing (docs/blind_trial.md has their table).
 """
 

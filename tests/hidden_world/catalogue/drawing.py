@@ -1,4 +1,4 @@
-"""What laws are written with: units, places of pixels, how a case draws its parameters."""
+"""Parts of laws: units, places of pixels, how a case draws its parameters."""
 
 from __future__ import annotations
 

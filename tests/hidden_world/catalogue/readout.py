@@ -1,4 +1,4 @@
-"""The read-out: when it looks, and what it reports."""
+"""The read-out: its moments, and its reports."""
 
 from __future__ import annotations
 
@@ -25,9 +25,9 @@ from tests.hidden_world.mechanism import Bits, Law, Mechanism, OnBits, OnCamera,
 from tests.hidden_world.unit import Camera
 
 WANDER = 0.5
-"""What a loop that locks to a reference keeps of its error from frame to frame."""
+"""Share of its error that a loop keeps from frame to frame when it locks to a reference."""
 FAINT = 0.05
-"""What an almost dead pixel has left of its gain."""
+"""Gain of an almost dead pixel, over that of a whole one."""
 GLITCH = 8
 """Pixels side by side that a glitch of a row's bus makes spikes of."""
 

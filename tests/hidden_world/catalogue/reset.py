@@ -1,4 +1,4 @@
-"""The reset and the comparator before it; what a spike does to its neighbours."""
+"""The reset and the comparator before it; the effect of a spike on its neighbours."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The threshold: patterns of it, noise on it, what the supply and the clock do to it."""
+"""The threshold: patterns of it, noise on it, and the effects of supply and clock."""
 
 from __future__ import annotations
 
