@@ -25,7 +25,7 @@ MOST_ROWS = 15
 """Statistics in the table of the largest differences."""
 
 
-class Step(NamedTuple):
+class StepRow(NamedTuple):
     """One step of the search."""
 
     title: str
@@ -120,7 +120,7 @@ def group_rows(d: Diagnosis) -> Rows:
     return [(g, group_meaning(g)) for g in dict.fromkeys(s.group for s in differing(d)[:MOST_ROWS])]
 
 
-def steps(d: Diagnosis) -> Iterator[Step]:
+def steps(d: Diagnosis) -> Iterator[StepRow]:
     """The search, step by step.  Candidates for an unknown effect are parts of a patch."""
     added = "in the patch" if d.verdict == "unknown" else "accepted"
     beside: list[str] = []
@@ -132,7 +132,7 @@ def steps(d: Diagnosis) -> Iterator[Step]:
              ": ".join(filter(None, (added if r.accepted else "rejected", r.reason))))
             for r in ranked
         ]  # fmt: skip
-        yield Step(
+        yield StepRow(
             f"Step {step}: {start} (misfit {number(before)})", rows, ["accepted" if r.accepted else "" for r in ranked]
         )
         beside += [human(r.name) for r in ranked if r.accepted]
