@@ -17,6 +17,7 @@ from spikecam_env.errors import InputError
 from spikecam_env.renamed import old_names
 from spikecam_env.streams import isi_plane
 from spikecam_env.streams.hdf5 import CHUNK_FRAMES, OpenRecording, open_recording
+from spikecam_env.types import Pictures, Spikes
 
 FIRST_REACH = 32
 """Frames of the clean stream read on either side at first."""
@@ -24,17 +25,12 @@ FIRST_REACH = 32
 
 @dataclass(frozen=True)
 class SpikeWindow:
-    """spikes (2 reach + 1, h, w) uint8, noisy; clean_isi (h, w) float32, normalised: 1 / ISI in (0, 1].
+    """A window of a recording, and its clean intervals."""
 
-    >>> plan = Plan("mine", (Entry("train/disk.h5", "disk", 0, 0),), shape=(8, 16), frames=100)
-    >>> built = build(plan, "small")
-    >>> window = read_window("small/train/disk.h5", 50, reach=10)
-    >>> window.spikes.shape, window.clean_isi.dtype
-    ((21, 8, 16), dtype('float32'))
-    """
-
-    spikes: NDArray[np.uint8]
-    clean_isi: NDArray[np.float32]
+    spikes: Spikes
+    """(2 reach + 1, h, w), noisy."""
+    clean_isi: Pictures
+    """(h, w), normalised: 1 / ISI in (0, 1]."""
 
 
 def read_window(
@@ -42,15 +38,24 @@ def read_window(
 ) -> SpikeWindow:
     """Frames frame - reach .. frame + reach of the noisy stream, and the clean ISI plane at `frame`, of a crop.
 
-    rows, columns: slices with start and stop; None for all.  The plane is
-    `isi_plane(clean, frame, normalised=True)` of the whole clean stream, to the bit.
-    Errors: InputError if the window or the crop leaves the recording, or it has no clean twin.
+    The plane is `isi_plane(clean, frame, normalised=True)` of the whole clean stream, to the bit.
 
-    >>> plan = Plan("mine", (Entry("train/disk.h5", "disk", 0, 0),), shape=(8, 16), frames=100)
-    >>> built = build(plan, "small")
-    >>> window = read_window("small/train/disk.h5", 50, columns=slice(0, 4))
-    >>> window.spikes.shape, window.clean_isi.shape
-    ((41, 8, 4), (8, 4))
+    Args:
+        path: of a recording with a clean twin.
+        frame: in the middle of the window.
+        reach: frames before and after it.
+        rows: a slice with start and stop; None: all.
+        columns: likewise.
+
+    Raises:
+        InputError: the window or the crop leaves the recording, or it has no clean twin.
+
+    Example:
+        >>> plan = Plan("mine", (PlannedScene("train/disk.h5", "disk", 0, 0),), shape=(8, 16), frames=100)
+        >>> built = build(plan, "small")
+        >>> window = read_window("small/train/disk.h5", 50, columns=slice(0, 4))
+        >>> window.spikes.shape, window.clean_isi.shape
+        ((41, 8, 4), (8, 4))
     """
     with open_recording(path) as recording:
         if "clean" not in recording.streams:
