@@ -23,13 +23,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from spikecam_env.gap.acquisition.design import standard_design
+from spikecam_env.gap.baseline.off_nominal import USUAL_NOISE
 from spikecam_env.gap.candidates.strength import bounded, with_effect
 from spikecam_env.gap.candidates.table import candidate
 from spikecam_env.gap.fit.predict import with_drawn_pattern
 from spikecam_env.gap.fit.standard_case import FRAMES, SHAPE, standard_case
 from spikecam_env.gap.observe.conditions import planned_conditions
 from spikecam_env.gap.screen.templates import shipped_templates
-from spikecam_env.gap.settings import UnitSettings
 from spikecam_env.gap.statistics import StatisticKey
 from spikecam_env.sensor import CATALOGUE, SensorModel
 from tests.hidden_world.catalogue import CATALOGUE as HIDDEN
@@ -59,7 +59,7 @@ def of_a_reset() -> float:
     model = SensorModel.preset("physical")
     unit = model.draw_unit(SHAPE, 0)
     s2 = float(np.mean(1.0 / unit.electrons + unit.kappa**2))
-    return 1e3 * model.circuit.swing_V * float(np.sqrt((UnitSettings().usual_noise - 1.0) * s2))
+    return 1e3 * model.circuit.swing_V * float(np.sqrt((USUAL_NOISE - 1.0) * s2))
 
 
 def heard(keys: Sequence[StatisticKey]) -> NDArray[np.bool_]:

@@ -1,4 +1,4 @@
-"""Whether statistics go with the strength of an effect as far as `settings.Twins.target_size` takes them to.
+"""Whether statistics go with the strength of an effect as far as `candidates.strength.TARGET_SIZE` takes them to.
 
     python -m benchmarks.in_proportion [PRESET ...]      by default scsim and physical, whose noise is smaller
 
@@ -14,18 +14,16 @@ import sys
 
 import numpy as np
 
-from spikecam_env.gap.candidates.strength import bounded, with_effect
+from spikecam_env.gap.candidates.strength import MOST_EXTRAPOLATED, bounded, with_effect
 from spikecam_env.gap.candidates.table import candidate
+from spikecam_env.gap.compare.prediction import TOLERANCE
 from spikecam_env.gap.fit.predict import predict_by_twins
 from spikecam_env.gap.fit.standard_case import standard_case
 from spikecam_env.gap.screen.templates import shipped_templates
-from spikecam_env.gap.settings import DiagnosisSettings
 from spikecam_env.gap.unit.refit import constrained_refit
 from spikecam_env.sensor import CATALOGUE
 
 PEAK, TWINS = 15.0, 4
-TOLERANCE = DiagnosisSettings().judging.tolerance
-MOST_EXTRAPOLATED = DiagnosisSettings().twins.most_extrapolated
 
 
 def report(preset: str) -> None:

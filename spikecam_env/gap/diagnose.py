@@ -186,7 +186,7 @@ def of_spikes(
     with stages.timed("motion"):
         seen, motion = without_motion(seen, static_only=asked.static_only, settings=asked.settings)
     if motion and not seen.recordings:
-        return Findings(moves(tested, motion, asked.settings, static_only=asked.static_only), None, motion=motion)
+        return Findings(moves(tested, motion, static_only=asked.static_only), None, motion=motion)
     with stages.timed("refit"):
         case = case_of_observed(measured, seen, asked.seed, asked.jobs, asked.settings)
         notes = [*static_note(motion), *label_unit_note(case.nominal_per_label, case.base)]
@@ -275,8 +275,8 @@ def comparison_of(case: Case, tested: SensorModel, asked: DiagnosisRequest, stag
     with stages.timed("audit"):
         contradictions = upheld(case, tested, audit(case))
         case = trimmed(case, contradictions)
-        limit, overrun = asked.effort * len(case.conditions), case.settings.twins.overrun
-        case = replace(case, budget=Budget(limit, verdict_known=bool(contradictions), overrun=overrun))
+        limit = asked.effort * len(case.conditions)
+        case = replace(case, budget=Budget(limit, verdict_known=bool(contradictions)))
     names, not_testable = testable(asked.names, case.conditions)
     lacking = missing_effects(case, tested, names)
     model = with_missing(tested, lacking)

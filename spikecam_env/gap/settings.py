@@ -1,19 +1,10 @@
-"""The settings of a diagnosis: every tuned number, with its unit and its source, by the stage that uses it.
+"""The settings of a diagnosis: numbers that a user may turn, with unit and source, by the stage that uses them.
 
     DiagnosisSettings().deviance.accept        12, misfit that an effect has to remove
 
-A number of this package is one of five kinds, and only the first is a setting:
-
-setting        a choice that decides something about a campaign: a threshold, a number of twins, a share.
-definition     part of what a statistic, an estimator, a template or a format is: lags, quantiles, the trimming of the
-               refit, windows, the standard case.  It applies to a measurement and its twins in the same way.
-measured table a property of each group of statistics: its floor (`statistics.FLOORS`), the noise of a pair of twins
-               (`compare.prediction.PAIR_NOISE`).
-numerics       a step of a derivative, a regularisation, a limit against overflow or endless loops.
-layout         rows, decimals and sizes of a page.
-
-The others stay where they are used.  `tools/site/settings.py` makes docs/reference/diagnosis_settings.md from the
-declarations below.  `tests/gap/test_settings.py` changes each of them by a factor of two.
+A setting decides something about a campaign that users may decide otherwise: an effort, a threshold of the alarm or of
+a name, a limit.  All other numbers are constants, with their unit and source, of the modules that use them.
+`tools/site/settings.py` makes docs/reference/diagnosis_settings.md from the declarations below.
 """
 
 from __future__ import annotations
@@ -31,27 +22,51 @@ from spikecam_env.untrusted import read_toml
 CHOICE = "a choice; the blind trial measures it with the others"
 TUNED = "set on the blind trial's part `tune`"
 
-PER_PARAMETER = 2.0
-"""Mean reduction of the deviance by a parameter without a meaning (Akaike)."""
+CONSTANTS = {
+    "deviance": ("stop",),
+    "judging": ("heavy", "tolerance", "clear", "apart", "as_well"),
+    "baseline": ("least_gross", "irregular", "least_counts"),
+    "unit": ("usual_noise", "identifiable", "own_share"),
+    "twins": ("of_events", "target_size", "most_extrapolated", "converged", "overrun"),
+    "fitting": ("visible", "most_steps", "small_step", "long_step", "longest_step"),
+    "searching": (
+        "fewest_fitted",
+        "worth",
+        "same_share",
+        "least_events",
+        "least_change",
+        "line",
+        "least_spikes",
+        "descents",
+    ),
+    "concluding": ("large_share", "local_noises", "times_expected", "least_frames", "line_ratio"),
+    "bounding": ("most_effect_size", "overshoot"),
+    "maps": ("steps",),
+}
+"""Numbers that were settings once, by stage."""
 
 
-def setting(default: Any, unit: str, what: str, source: str, least: float = 0.0, most: float = math.inf) -> Any:
+def setting(default: Any, unit: str, meaning: str, source: str, least: float = 0.0, most: float = math.inf) -> Any:
     """A field of settings.
 
     Args:
-        default: its value, whose kind others have: a whole number, or a number.
+        default: its value, of the kind that others must have: a whole number, or a number.
         unit: of the value.
-        what: what it decides, in one sentence.
-        source: where the value comes from: a command that measures it, literature, or a choice.
+        meaning: the decision that it takes, in one sentence.
+        source: a command that measures it, literature, or a choice.
         least: its lowest value; 0 is none.
         most: its highest value.
     """
-    about = {"unit": unit, "what": what, "source": source, "range": (least, most)}
+    about = {"unit": unit, "meaning": meaning, "source": source, "range": (least, most)}
     return field(default=default, metadata=about)
 
 
 def check_setting(name: str, declared: Field[Any], value: object) -> None:
-    """Raises InputError unless a value has the kind of its setting's default, and is in its range."""
+    """Check a value against its setting.
+
+    Raises:
+        InputError: for a value of another kind than the default, or out of range.
+    """
     least, most = declared.metadata["range"]
     if isinstance(declared.default, int):
         checked_whole(value, name, max(int(least), 1))
@@ -67,30 +82,11 @@ class Deviance:
     tie: float = setting(
         6.0, "deviance", "Two hypotheses nearer to each other than this are tied.", "2 log 20, a likelihood ratio of 20"
     )
-    stop: float = setting(
-        1.0,
-        "deviance",
-        "Least promised reduction for another step of the parameters.  Small, since two parameters that compensate "
-        "each other may both be far off while a step gains little.",
-        CHOICE,
-    )
 
     @property
     def by_chance(self) -> float:
         """Increase in misfit that the chance of the draws can explain: half a tie."""
         return self.tie / 2
-
-    @property
-    def join(self) -> float:
-        """Reduction for a later effect to earn a joint refit: two parameters without a meaning.  Less than `accept`,
-        since earlier effects may have absorbed part of its signature."""
-        return 2 * PER_PARAMETER
-
-    @property
-    def compare(self) -> float:
-        """As `stop`, while candidates are compared, and for the fit of one to go on after a twin: less would not
-        change their order."""
-        return 5 * self.stop
 
     @property
     def dismiss(self) -> float:
@@ -120,14 +116,8 @@ class Deviance:
 
 @dataclass(frozen=True)
 class Judging:
-    """How far off a statistic is, and what is chance."""
+    """The limits of chance."""
 
-    heavy: float = setting(
-        8.0,
-        "degrees of freedom",
-        "Of Student's loss: statistics that are far off count by their logarithm.",
-        "a second effect beside the first must not pull its fit",
-    )
     alarm: float = setting(
         0.02,
         "p, adjusted",
@@ -143,42 +133,8 @@ class Judging:
         most=1.0,
     )
     chance_p: float = setting(
-        0.002, "p, adjusted", "Above it, what no candidate explains may be chance.", TUNED, most=1.0
+        0.002, "p, adjusted", "Above it, a difference that no candidate explains may be chance.", TUNED, most=1.0
     )
-    tolerance: float = setting(
-        0.05,
-        "of an effect",
-        "Error of an effect's simulated change.",
-        "laws of first order in sub-frame time, beside a camera's; more twins do not make it smaller",
-        most=1.0,
-    )
-    clear: float = setting(
-        5.0,
-        "noises",
-        "A statistic so far off is not chance: its recording is simulated, it describes a discrepancy; it counts no "
-        "further in the score of a bound.",
-        "of 600 statistics one is so far off by chance in one campaign of 3000",
-    )
-    apart: float = setting(
-        3.0,
-        "noises",
-        "Two simulations, or two values of a parameter, that differ by more are not the same.",
-        CHOICE,
-    )
-    as_well: float = setting(
-        0.5,
-        "of its size on the best",
-        "An effect that is clear on no statistic counts on those on which it shows as well as this; one that shows "
-        "clearly, on those of the square of this.",
-        CHOICE,
-        most=1.0,
-    )
-
-    @property
-    def shows(self) -> float:
-        """Noises of a change that is clear of the twins' own noise, twice `apart`: of a pattern or motion that stands
-        out by itself, of a step for a derivative, of an effect for its bound, of lost frames."""
-        return 2 * self.apart
 
     @property
     def least_chance(self) -> float:
@@ -189,7 +145,7 @@ class Judging:
 
 @dataclass(frozen=True)
 class Baseline:
-    """Before a search: labels, lost frames, orientation and motion, and what a refit shows to be missing."""
+    """Before a search: labels and motion."""
 
     least_error: float = setting(
         1e-3,
@@ -197,27 +153,6 @@ class Baseline:
         "Error of a label from which it is reported.  An array that fires in all frames but so few fires in every one.",
         CHOICE,
         most=1.0,
-    )
-    least_gross: float = setting(
-        0.02,
-        "relative",
-        "Error of a dark recording, and curvature by exchanged labels, from which they are reported.",
-        "of few spikes a pixel, the rate between first and last is biased by their number squared",
-        most=1.0,
-    )
-    irregular: float = setting(
-        0.1,
-        "of the error of a label",
-        "Share of irregular intervals from which the label is not at fault: light of another level makes none.  In all "
-        "frames but so many, frames that are missing are late by little.",
-        CHOICE,
-        most=1.0,
-    )
-    least_counts: float = setting(
-        20.0,
-        "spikes or pixels",
-        "Expected in a window that is looked at for motion; timed in a recording that is looked at for lost frames.",
-        "fewer are no normal deviates",
     )
     false_alarm: float = setting(
         1e-3,
@@ -242,7 +177,7 @@ class Baseline:
 
 @dataclass(frozen=True)
 class UnitSettings:
-    """Limits of what a unit may be."""
+    """The spread of units."""
 
     usual: float = setting(
         1.8,
@@ -251,37 +186,16 @@ class UnitSettings:
         "units differ by 5-20 %",
         least=1.0,
     )
-    usual_noise: float = setting(
-        1.5,
-        "times nominal",
-        "The same of s^2, the relative variance of an interval.",
-        "the electrons, or the square of the millivolts, of a unit 20 % off",
-        least=1.0,
-    )
-    identifiable: float = setting(
-        0.5,
-        "of the refit's s^2",
-        "If the unit's own share is smaller, refits of twins do not identify it, and it stays as it was.",
-        CHOICE,
-        most=1.0,
-    )
-    own_share: float = setting(
-        0.9,
-        "of the refit's s^2",
-        "If the unit's own share is smaller, it is fitted with the effects.",
-        CHOICE,
-        most=1.0,
-    )
 
     @property
     def spread_limits(self) -> tuple[float, float]:
-        """Spreads of drawn units, times nominal: what is usual.  Beyond, a wider or narrower pattern is a gap."""
+        """Usual spreads of drawn units, times nominal.  Beyond, a wider or narrower pattern is a gap."""
         return 1 / self.usual, self.usual
 
 
 @dataclass(frozen=True)
 class Twins:
-    """What is simulated, and how often."""
+    """Numbers of simulations."""
 
     drawn_units: int = setting(
         24,
@@ -291,84 +205,19 @@ class Twins:
         least=2,
     )
     to_confirm: int = setting(
-        2, "twins", "Confirm a candidate; show a model whose gap is large beside what two leave open.", CHOICE
+        2, "twins", "Confirm a candidate; show a model whose gap is large beside the error of two twins.", CHOICE
     )
-    of_events: int = setting(
-        3,
-        "twins",
-        "Of a sparse or mixed effect, which cannot be simulated stronger to exceed one twin's noise.",
-        CHOICE,
-    )
-    target_size: float = setting(
-        60.0,
-        "noises",
-        "A weak linear effect is simulated as strong as this, within `most_extrapolated`, and scaled down.",
-        "in proportion so far: `python -m benchmarks.in_proportion`",
-    )
-    most_extrapolated: float = setting(
-        4.0,
-        "times",
-        "A strength, and the unit under it, are extrapolated at once.",
-        "in proportion so far: `python -m benchmarks.in_proportion`",
-        least=1.0,
-    )
-    converged: float = setting(
-        3e-4,
-        "of the gain",
-        "Change of the unit up to which it need not be simulated again.",
-        "a thirtieth of what four kicks of 0.0025 add to a rate, the crosstalk of `tests/gap/fit/test_candidate.py`",
-    )
-    overrun: float = setting(1.3, "budgets", "Limit of steps that an undecided verdict needs.", CHOICE)
 
     @property
     def in_the_end(self) -> int:
-        """Twins that confirm the chosen effects, give the covariance of their parameters, test a bound, and show what a
-        model without noise refits to: twice `to_confirm`."""
+        """Twins that confirm the chosen effects, give the covariance of their parameters, test a bound, and show the
+        refit of a model without noise: twice `to_confirm`."""
         return 2 * self.to_confirm
-
-    @property
-    def of_random_course(self) -> int:
-        """Twins whose scatter counts, twice `of_events`: of an effect of random course, of what is relabelled."""
-        return 2 * self.of_events
-
-
-@dataclass(frozen=True)
-class Fitting:
-    """The fit of a strength by twins, and of other parameters by Gauss-Newton."""
-
-    visible: float = setting(
-        4.0, "noises", "Least size of a simulated effect from which its strength is scaled.", CHOICE
-    )
-    most_steps: int = setting(4, "steps", "Of a descent, and of effects that start together.", CHOICE)
-    small_step: float = setting(
-        0.05, "of a logarithm", "A step so small needs no other; two strengths so close show no slope.", CHOICE
-    )
-    long_step: float = setting(0.5, "of a logarithm", "Beyond it, derivatives are taken anew.", CHOICE)
-    longest_step: float = setting(
-        0.7, "of a logarithm", "Largest step at once, within what was open of the parameter before.", "a factor of two"
-    )
-
-    @property
-    def most_tries(self) -> int:
-        """Strengths that are tried for one strength, for the score of a bound, and for a bound: one more than the steps
-        between them."""
-        return self.most_steps + 1
-
-    @property
-    def round_off(self) -> tuple[float, float]:
-        """Factors within which a strength is scaled without another twin: half of `longest_step`."""
-        return math.exp(-self.longest_step / 2), math.exp(self.longest_step / 2)
-
-    @property
-    def largest_factor(self) -> float:
-        """Factor by which starts are scaled to compare them, or one that mostly scatters without other twins: a
-        `longest_step`."""
-        return math.exp(self.longest_step)
 
 
 @dataclass(frozen=True)
 class Searching:
-    """Which candidates are fitted, which are added, and when a search goes on."""
+    """Limits of a search."""
 
     most_effects: int = setting(3, "effects", "Named together.", CHOICE)
     campaigns_per_effect: int = setting(
@@ -377,61 +226,17 @@ class Searching:
         "Cost of another effect, by which the budget allows it.",
         "measured: 13 to 25 in four diagnoses",
     )
-    fewest_fitted: int = setting(3, "candidates", "Fitted in a round at least, the best by their templates.", CHOICE)
     most_fitted: int = setting(5, "candidates", "Fitted in a round at most, the best by their templates.", CHOICE)
-    worth: float = setting(
-        0.5,
-        "of what the best removes",
-        "What removes less is not worth another fit: a start, a shape, a runner-up of an earlier effect; nor is a "
-        "second bend that removes less of what is beyond chance refined before more is found, nor an effect named that "
-        "removes less of what another leaves of a law that differs in details.  Pixels differ by no "
-        "more of a label's error; a recording that was turned gains more of what its correlation lacks.",
-        CHOICE,
-        most=1.0,
-    )
-    same_share: float = setting(
-        0.8,
-        "of what the best removes",
-        "Nearly all: a runner-up, or another start, that removes more is tried in its place.  A mistake of a campaign, "
-        "once undone, removes so much of the disagreement.",
-        CHOICE,
-        most=1.0,
-    )
-    least_events: float = setting(
-        0.5, "pixels, spikes or frames", "An effect that changes fewer is not there.", "they round to none"
-    )
-    least_change: float = setting(
-        2.0, "noises", "An effect that changes no statistic by more is not added.", "twins of nothing differ by luck"
-    )
-    line: float = setting(
-        30.0, "times the usual power", "A line from whose frequency periodic candidates start.", CHOICE
-    )
-    least_spikes: int = setting(
-        1000, "spikes", "Of a recording whose spectrum, or orientation, says something.", CHOICE
-    )
-    descents: int = setting(2, "starts", "Of two effects that start jointly, from which both are fitted.", CHOICE)
 
     @property
     def earlier_tried(self) -> int:
         """Runners-up that are tried in place of an earlier effect: all that are fitted in a round, but the first."""
         return self.most_fitted - 1
 
-    @property
-    def least_share(self) -> float:
-        """Share that is little: what `same_share` leaves.  A first effect that removes less, and leaves something, is
-        not refined before another is found; a mistake that is undone leaves no more of the disagreement."""
-        return 1 - self.same_share
-
-    @property
-    def largest_sd(self) -> float:
-        """Standard deviation of a strength, relative, up to which an effect of maps is there: one by which it is
-        `least_change` from 0."""
-        return 1 / self.least_change
-
 
 @dataclass(frozen=True)
 class Concluding:
-    """From a search to a verdict."""
+    """The remainder that a name may leave."""
 
     most_left: float = setting(
         0.05, "of the deviance beyond chance", "A name may leave so much in all.", TUNED, most=1.0
@@ -443,52 +248,18 @@ class Concluding:
         TUNED,
         most=1.0,
     )
-    large_share: float = setting(
-        0.3,
-        "of all",
-        "What many pixels have in common is common to them; irregular intervals that the halves differ by are of one "
-        "half; static pixels are enough to be looked at alone; spikes of an expected dark level are there; of a frame, "
-        "pixels are late.",
-        CHOICE,
-        most=1.0,
-    )
-    local_noises: float = setting(
-        8.0,
-        "noises",
-        "A field, or a half, that stands out so far is where, or when, an effect acts.",
-        "comparisons are many; in the clean campaigns of `tests/gap/verdict` none does",
-    )
-    times_expected: float = setting(
-        2.0, "times expected", "Irregular intervals of a field in which an effect acts.", CHOICE, least=1.0
-    )
-    least_frames: int = setting(
-        1000,
-        "frames",
-        "Shortest recording whose halves are compared, by their lines or for the floor of the gap.",
-        "pixels of one rate make a line of their own at first",
-    )
-    line_ratio: float = setting(6.0, "times", "Power of a line in one half over that in the other.", CHOICE, least=1.0)
 
 
 @dataclass(frozen=True)
 class Bounding:
     """Upper bounds of effects that were not found."""
 
-    most_effect_size: float = setting(
-        25.0,
-        "noises",
-        "Size of an effect at most for its score.",
-        "what it changes there is like what it changes at its bound",
-    )
     resolution: float = setting(
         0.6,
         "of a bound",
         "The least strength that would be refuted is not below it.",
         "a choice, stated on the page",
         most=1.0,
-    )
-    overshoot: float = setting(
-        1.2, "times", "The first strength that is tested, over what is expected.", CHOICE, least=1.0
     )
     campaigns: int = setting(150, "campaigns", "Cost of all bounds, by which the budget allows them.", "measured")
 
@@ -498,7 +269,6 @@ class MapSettings:
     """Recordings that are rates only."""
 
     units: int = setting(8, "units", "Over which a prediction is averaged.", CHOICE, least=2)
-    steps: int = setting(6, "steps", "Of a fit.", CHOICE)
     most_effects: int = setting(5, "effects", "Named together.", CHOICE)
     most_left: float = setting(
         0.08,
@@ -512,10 +282,11 @@ class MapSettings:
 class DiagnosisSettings:
     """Every setting of a diagnosis, by stage.
 
-    >>> DiagnosisSettings().deviance.keep
-    15.0
-    >>> DiagnosisSettings.of({"deviance.tie": 8.0}).changed()
-    {'deviance.tie': 8.0}
+    Example:
+        >>> DiagnosisSettings().deviance.keep
+        15.0
+        >>> DiagnosisSettings.of({"deviance.tie": 8.0}).changed()
+        {'deviance.tie': 8.0}
     """
 
     deviance: Deviance = field(default_factory=Deviance)
@@ -523,7 +294,6 @@ class DiagnosisSettings:
     baseline: Baseline = field(default_factory=Baseline)
     unit: UnitSettings = field(default_factory=UnitSettings)
     twins: Twins = field(default_factory=Twins)
-    fitting: Fitting = field(default_factory=Fitting)
     searching: Searching = field(default_factory=Searching)
     concluding: Concluding = field(default_factory=Concluding)
     bounding: Bounding = field(default_factory=Bounding)
@@ -542,10 +312,15 @@ class DiagnosisSettings:
     def of(cls, changes: Mapping[str, Any]) -> DiagnosisSettings:
         """The defaults with some settings changed, as `changed` lists them.
 
-        Raises InputError for an unknown name, and a value of another kind or out of range.
+        Args:
+            changes: {"stage.name": value}.
 
-        >>> DiagnosisSettings.of({"deviance.tie": 8.0}).deviance.dismiss
-        16.0
+        Raises:
+            InputError: for an unknown name, and a value of another kind or out of range.
+
+        Example:
+            >>> DiagnosisSettings.of({"deviance.tie": 8.0}).deviance.dismiss
+            16.0
         """
         stages: dict[str, dict[str, Any]] = {}
         for name, value in changes.items():
@@ -558,7 +333,8 @@ class DiagnosisSettings:
     def from_toml(cls, path: str | os.PathLike[str]) -> DiagnosisSettings:
         """The defaults with some settings changed, as a TOML file lists them: `deviance.tie = 8.0`, or a table a stage.
 
-        Raises InputError as `of`, and for a file that is no TOML.
+        Raises:
+            InputError: as `of`, and for a file that is no TOML.
         """
         changes: dict[str, Any] = {}
         for stage, own in read_toml(os.fspath(path)).items():
@@ -582,7 +358,11 @@ class DiagnosisSettings:
 
 
 def checked_settings(settings: DiagnosisSettings | None) -> DiagnosisSettings:
-    """The settings; the defaults for None.  Raises InputError for anything else."""
+    """The settings; the defaults for None.
+
+    Raises:
+        InputError: for anything else.
+    """
     if settings is None:
         return DiagnosisSettings()
     if not isinstance(settings, DiagnosisSettings):
@@ -593,11 +373,17 @@ def checked_settings(settings: DiagnosisSettings | None) -> DiagnosisSettings:
 
 
 def _known(name: str) -> str:
-    """A setting's name.  Raises InputError for an unknown one, with those that are like it."""
+    """A setting's name.
+
+    Raises:
+        InputError: for a constant, and for an unknown name, with the settings that are like it.
+    """
     known = [f"{stage}.{key}" for stage, key, _ in every_setting()]
     if name in known:
         return name
     stage, _, key = name.partition(".")
+    if key in CONSTANTS.get(stage, ()):
+        raise InputError(f"{name} is a constant of the diagnosis now, not a setting; leave it out")
     same_name = [n for n in known if n.split(".")[1] in (key, stage)]
     same_stage = [n for n in known if n.split(".")[0] == stage]
     raise unknown_name("setting", name, same_name or same_stage or [f.name for f in fields(DiagnosisSettings)])

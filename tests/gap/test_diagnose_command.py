@@ -59,7 +59,7 @@ def test_settings_come_from_a_file(campaign: Path, tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     "text, said",
     [
-        ("deviance.ties = 8.0", "unknown setting 'deviance.ties'; choose one of deviance.accept, deviance.stop, "
+        ("deviance.ties = 8.0", "unknown setting 'deviance.ties'; choose one of deviance.accept, "
                                 "deviance.tie (deviance.tie?)"),
         ("tie = 8.0", "unknown setting 'tie'; choose one of deviance.tie"),
         ("judging.tie = 8.0", "unknown setting 'judging.tie'; choose one of deviance.tie (deviance.tie?)"),
@@ -75,6 +75,8 @@ def test_settings_come_from_a_file(campaign: Path, tmp_path: Path) -> None:
         ("twins.drawn_units = 1", "twins.drawn_units = 1; it must be a whole number, 2 or more"),
         ("unit.usual = 0.9", "unit.usual = 0.9; it must be a finite number of at least 1"),
         ("unit.usual = [1.8]", "unit.usual = [1.8]; it must be"),
+        ("deviance.stop = 1.0", "deviance.stop is a constant of the diagnosis now, not a setting; leave it out"),
+        ("[fitting]\nmost_steps = 4", "fitting.most_steps is a constant"),
         ("deviance", "is not a TOML file"),
     ],
 )  # fmt: skip

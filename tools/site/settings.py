@@ -25,7 +25,7 @@ def _section(stage: str, settings: Any) -> str:
 
 def _row(declared: Field[Any], value: Any) -> str:
     said = declared.metadata
-    what = " ".join(said["what"].split())
+    what = " ".join(said["meaning"].split())
     return f"| `{declared.name}` | {value:g} | {said['unit']} | {_range(declared)} | {what} | {said['source']} |"
 
 

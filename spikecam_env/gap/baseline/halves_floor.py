@@ -16,6 +16,9 @@ from spikecam_env.gap.statistics.reading import CampaignReading
 from spikecam_env.gap.twins.case import Case
 from spikecam_env.gap.unit.refit import BaseFit
 
+LEAST_FRAMES = 1000
+"""Shortest recording whose halves are compared: at first, pixels of one rate make a line of their own."""
+
 
 def floor_of_halves(case: Case, recordings: Sequence[CampaignRecording], null: Null) -> float:
     """Mean of (first - second half)^2 / 4 noise^2 over the statistics that the gap is the mean of.
@@ -25,13 +28,12 @@ def floor_of_halves(case: Case, recordings: Sequence[CampaignRecording], null: N
     pattern, which halves share and the gap compares with fresh units.  NaN where no steady recording is long enough.
     """
     held = case.held_out(null.keys)
-    least = null.settings.concluding.least_frames
     names = {k.recording for k, is_held in zip(null.keys, held, strict=True) if is_held}
     steady = [
         (c, r)
         for c in case.conditions
         for r in recordings
-        if r.name == c.name and c.name in names and c.kind in ("dark", "flat") and c.frames >= least
+        if r.name == c.name and c.name in names and c.kind in ("dark", "flat") and c.frames >= LEAST_FRAMES
     ]
     if not steady:
         return float("nan")

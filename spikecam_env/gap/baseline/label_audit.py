@@ -23,6 +23,23 @@ from spikecam_env.robust import scatter
 from spikecam_env.sensor import SensorModel
 from spikecam_env.types import Floats
 
+LEAST_GROSS = 0.02
+"""Relative error of a dark recording, and curvature by exchanged labels, from which they are reported: of few spikes a
+pixel, the rate between first and last is biased by their number squared."""
+
+PIXELS_DIFFER = 0.5
+"""Of a label's error, by which pixels differ where the label is not at fault."""
+
+IRREGULAR = 0.1
+"""Share of irregular intervals, of a label's error, from which the label is not at fault: light of another level makes
+none."""
+
+UNDONE = 0.8
+"""Share of the disagreement that a mistake of a campaign removes, once undone."""
+
+TWINS_OF_RELABELLED = 6
+"""Twins by whose scatter a relabelled recording is judged."""
+
 FEWEST_LEVELS = 5
 """Steady recordings that show a mistake: two of a line, two that may be exchanged, and one more."""
 
@@ -79,7 +96,7 @@ def swapped(case: Case, suspect: set[str]) -> list[Contradiction]:
     if len(names) < FEWEST_LEVELS:
         return []
     before = _bend(light, rate)[0]
-    if before < case.settings.baseline.least_gross:
+    if before < LEAST_GROSS:
         return []
     best: tuple[float, int, int] = (np.inf, 0, 0)
     for i, j in combinations(range(len(names)), 2):
@@ -87,7 +104,7 @@ def swapped(case: Case, suspect: set[str]) -> list[Contradiction]:
         other[[i, j]] = other[[j, i]]
         best = min(best, (_bend(other, rate)[0], i, j))
     left, i, j = best
-    if left > case.settings.searching.least_share * before:
+    if left > (1 - UNDONE) * before:
         return []
     a, b = names[i], names[j]
     return [Contradiction("swapped", (a, b), f"{a} and {b} seem to be swapped: exchanged, their rates follow the light "
@@ -104,7 +121,7 @@ def wrong_label(case: Case, suspect: set[str]) -> list[Contradiction]:
         keep = np.arange(len(names)) != i
         best = min(best, (_bend(light[keep], rate[keep])[0], i))
     left, i = best
-    if left > case.settings.searching.least_share * _bend(light, rate)[0]:
+    if left > (1 - UNDONE) * _bend(light, rate)[0]:
         return []
     keep = np.arange(len(names)) != i
     slope, dark = np.polyfit(light[keep], rate[keep], 1, w=1.0 / np.maximum(rate[keep], 1e-6))
@@ -120,11 +137,10 @@ def _wrong_flat(case: Case, name: str, names: Sequence[str], off: float, left: f
     A label is one number and makes no interval irregular; an effect that begins at that level differs from pixel to
     pixel.
     """
-    settings = case.settings
-    if abs(off) < settings.baseline.least_error:
+    if abs(off) < case.settings.baseline.least_error:
         return []
-    differs = pixel_spread(case, name, names) > settings.searching.worth * abs(off)
-    if differs or irregular_share(case, name) > settings.baseline.irregular * abs(off):
+    differs = pixel_spread(case, name, names) > PIXELS_DIFFER * abs(off)
+    if differs or irregular_share(case, name) > IRREGULAR * abs(off):
         return []
     text = (
         f"{name}: its rate fits {100 * off:+.2g} % more light than its label says; all others agree to "
@@ -139,9 +155,8 @@ def _wrong_dark(case: Case, name: str, rate: float, dark: float, left: float) ->
     left: how far the others are off their line at most, of their lowest rate.
     """
     off = float(rate / max(dark, 1e-9) - 1)
-    searching = case.settings.searching
-    outstanding = searching.same_share / searching.least_share
-    if off < case.settings.baseline.least_gross or rate - dark < outstanding * left:
+    outstanding = UNDONE / (1 - UNDONE)
+    if off < LEAST_GROSS or rate - dark < outstanding * left:
         return []
     text = f"{name}: labelled dark, but its rate is {100 * off:+.2g} % off the extrapolation of the flats"
     return [Contradiction("label", (name,), text)]
@@ -162,7 +177,7 @@ def agrees_when_relabelled(case: Case, model: SensorModel, label: Contradiction)
     [name] = label.recordings
     conditions = [relabelled(c, label.factor) if c.name == name else c for c in case.conditions]
     again = case.of(conditions, case.observations)
-    null = model_null(again, model, case.settings.twins.of_random_course)
+    null = model_null(again, model, TWINS_OF_RELABELLED)
     of = np.array([k.recording == name and k.group != "rates" for k in null.keys])
     return not adjusted(deviates(null, values_of(again.bank, null.keys))[of]).min() < null.settings.judging.gate
 

@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from spikecam_env.gap.baseline.contradiction import Contradiction
+from spikecam_env.gap.compare.distance import SHOWS
 from spikecam_env.gap.observe.conditions import Condition
 from spikecam_env.gap.observe.observation import BIN, ObservedRecording
 from spikecam_env.gap.statistics.film import refitted_film
@@ -14,6 +15,15 @@ from spikecam_env.types import Floats
 
 MOST_BINS = 25
 """Largest shift of a moving recording against its light that is looked for [bins of the film]."""
+
+LEAST_TIMED = 20
+"""Pixels with regular intervals only, of a recording that is looked at for lost frames."""
+
+LATE_SHARE = 0.3
+"""Frames by which pixels are late after a gap, at least.  Of the delay in a gap, that of other frames is less."""
+
+AS_GOOD = 0.8
+"""Of what the best shift removes, what one removes that does as well."""
 
 SEGMENTS = 8
 """Parts of a moving recording whose timing is compared."""
@@ -45,9 +55,7 @@ def _jump_steady(case: Case, o: ObservedRecording) -> tuple[int, float] | None:
     Two gaps are in few frames, a flicker in many.  Few pixels are late together by chance, where spikes are lost and a
     mean interval of 2 frames makes one of 4 regular.
     """
-    settings = case.settings
-    limits, share = settings.baseline, settings.concluding.large_share
-    if int(np.count_nonzero(o.short + o.long == 0)) < limits.least_counts:
+    if int(np.count_nonzero(o.short + o.long == 0)) < LEAST_TIMED:
         return None
     interval = o.shape[0] * o.shape[1] / max(float(o.frame.mean()), 1e-9)
     window = int(np.clip(round(interval), 4, o.frames // 8))
@@ -56,9 +64,9 @@ def _jump_steady(case: Case, o: ObservedRecording) -> tuple[int, float] | None:
     at = int(np.argmax(np.abs(total)))
     mean = float(total[at] / max(timed[at], 1))
     elsewhere = np.delete(np.abs(total), slice(max(at - 2 * window, 0), at + 2 * window))
-    passes = float(np.quantile(elsewhere, 1 - limits.irregular)) < share * abs(total[at])
+    passes = float(np.quantile(elsewhere, 0.9)) < LATE_SHARE * abs(total[at])
     inside = 2 * window <= at < total.size - 2 * window
-    if abs(total[at]) > 2 * settings.judging.shows * spread and abs(mean) > share and passes and inside:
+    if abs(total[at]) > 2 * SHOWS * spread and abs(mean) > LATE_SHARE and passes and inside:
         return at, -mean
     return None
 
@@ -68,8 +76,7 @@ def _jump_moving(case: Case, condition: Condition, o: ObservedRecording) -> tupl
     assert o.film is not None
     expected = refitted_film(condition, case.base)
     parts = np.array_split(np.arange(1, len(expected) - 1), SEGMENTS)  # the ends have a change on one side only
-    settings = case.settings
-    coarse = [_bins_late(o.film, expected, part, settings.searching.same_share) for part in parts]
+    coarse = [_bins_late(o.film, expected, part) for part in parts]
     if len(set(coarse)) > 1 and coarse[0] == 0:
         k = next(i for i, s in enumerate(coarse) if s != 0)
         return k * condition.frames // SEGMENTS, float(coarse[k] * BIN)
@@ -86,20 +93,20 @@ def _jump_moving(case: Case, condition: Condition, o: ObservedRecording) -> tupl
     steps = [times[k:].mean() - times[:k].mean() for k in range(1, SEGMENTS)]
     k = int(np.argmax(np.abs(steps))) + 1
     rest = max(float(np.std(times[:k] - times[:k].mean())), float(np.std(times[k:] - times[k:].mean())))
-    if abs(steps[k - 1]) < max(1 - settings.concluding.large_share, settings.judging.shows * rest):
+    if abs(steps[k - 1]) < max(1 - LATE_SHARE, SHOWS * rest):
         return None
     return k * condition.frames // SEGMENTS, -steps[k - 1]
 
 
-def _bins_late(film: NDArray[np.uint8], expected: Floats, part: NDArray[np.int64], same_share: float) -> int:
+def _bins_late(film: NDArray[np.uint8], expected: Floats, part: NDArray[np.int64]) -> int:
     """Bins by which the light has to be moved on to agree best with a part of the film, the fewest that do as well; 0
-    unless clearly better.  same_share: of what the best shift removes, what one removes that does as well."""
+    unless clearly better."""
     seen = film[part].astype(np.float64)
     scores = {}
     for shift in range(-MOST_BINS, MOST_BINS + 1):
         if part[0] + shift >= 0 and part[-1] + shift < len(expected):
             scores[shift] = float(((seen - expected[part + shift]) ** 2).sum())
     least = min(scores.values())
-    if least > same_share * scores[0]:
+    if least > AS_GOOD * scores[0]:
         return 0
-    return min((s for s in scores if scores[s] < scores[0] - same_share * (scores[0] - least)), key=abs)
+    return min((s for s in scores if scores[s] < scores[0] - AS_GOOD * (scores[0] - least)), key=abs)

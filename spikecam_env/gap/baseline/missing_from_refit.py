@@ -13,6 +13,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from spikecam_env.gap.compare.distance import CLEAR
 from spikecam_env.gap.twins.case import Case, refit_recordings, twins
 from spikecam_env.gap.twins.fresh_units import width
 from spikecam_env.gap.unit.refit import DARK, DARK_PATTERN, NOISE, RESPONSE, common_level, constrained_refit
@@ -20,6 +21,9 @@ from spikecam_env.robust import scatter
 from spikecam_env.sensor import Effect, SensorModel
 from spikecam_env.sensor.effects import CATALOGUE
 from spikecam_env.sensor.effects.base import build
+
+FIRED_SHARE = 0.3
+"""Of the spikes that a dark level would give, those that dark recordings hold where the level is there."""
 
 
 @dataclass(frozen=True)
@@ -65,13 +69,13 @@ def _dark_level(case: Case, model: SensorModel) -> Iterator[_Size]:
     Of equal pixels with a spike or two in the dark some have a rate there, and others thirty times the error: for the
     spread only those of the usual error count.
     """
-    judging, usual = case.settings.judging, case.settings.unit.usual
+    usual = case.settings.unit.usual
     live = case.base.live
     gain, dark, sd = case.base.gain[live], case.base.dark[live], case.base.dark_sd[live]
     count = _root_of_twice(live)
     to_pA = model.circuit.capacitance_fF * model.circuit.swing_V * model.frame_rate_hz * 1e-3
     level, error = common_level(dark, sd), float(np.median(sd))
-    if not _has(model, DARK) and level > judging.clear * error / count and fires_in_the_dark(case, level):
+    if not _has(model, DARK) and level > CLEAR * error / count and fires_in_the_dark(case, level):
         yield _Size("dark_current", level * to_pA, float(dark.std()) * to_pA / np.sqrt(live.sum()))
     if not _has(model, DARK_PATTERN) and level > 0:
         known = sd <= usual * np.median(sd)
@@ -108,7 +112,7 @@ def is_noise(case: Case, model: SensorModel) -> bool:
     base = constrained_refit(model, case.base)
     made = twins(case, model, base, range(case.settings.twins.in_the_end), sorted(refit_recordings(case)))
     white = np.array([t.base.white for t in made if t.base is not None])
-    return bool(case.base.white > white.mean() + case.settings.judging.clear * white.std(ddof=1))
+    return bool(case.base.white > white.mean() + CLEAR * white.std(ddof=1))
 
 
 def fires_in_the_dark(case: Case, level: float) -> bool:
@@ -118,4 +122,4 @@ def fires_in_the_dark(case: Case, level: float) -> bool:
     """
     dark = [o for c, o in zip(case.conditions, case.observations, strict=True) if c.kind == "dark"]
     expected = sum(level * o.frames * o.times.count.size for o in dark)
-    return not dark or sum(int(o.times.count.sum()) for o in dark) > case.settings.concluding.large_share * expected
+    return not dark or sum(int(o.times.count.sum()) for o in dark) > FIRED_SHARE * expected

@@ -61,6 +61,10 @@ _TRIMS = 4
 """Times that a common mode is fitted anew without the pixels that are off it."""
 
 
+LEAST_COUNTS = 20.0
+"""Spikes that are expected in a window, at least: fewer are no normal deviates."""
+
+
 @dataclass(frozen=True)
 class DetectedMotion:
     """What moves in a recording.
@@ -255,7 +259,7 @@ def beyond(
     times = 1.0 + shared / max(_own_variance(planes), 1e-9)
     z = capped / np.sqrt(np.maximum(times * variance + (times - 1.0) * np.abs(capped) / 3.0, 1e-9))
     contrast = off / np.maximum(expected, 1e-9)
-    enough = np.maximum(expected, expected + off) >= limits.least_counts
+    enough = np.maximum(expected, expected + off) >= LEAST_COUNTS
     for k, i, j in np.argwhere(enough & (np.abs(z) > least_z) & (np.abs(contrast) > limits.least_contrast)):
         blocks = (int(k) * span, (int(k) + 1) * span)
         yield _Window(int(rows[i]), int(columns[j]), *size, blocks, float(z[k, i, j]), float(contrast[k, i, j]))

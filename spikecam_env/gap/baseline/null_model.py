@@ -51,7 +51,7 @@ def unit_under(case: Case, model: SensorModel) -> BaseFit:
     base = constrained_refit(model, case.base)
     if case.scenes_only:
         simulated = [t.base for t in twins(case, model, base, range(50, 54)) if t.base]
-        base = inferred_unit(model, base, case.base, simulated, case.settings.unit.identifiable)
+        base = inferred_unit(model, base, case.base, simulated)
     return base
 
 

@@ -16,6 +16,10 @@ from spikecam_env.gap.unit.usual import unusual
 from spikecam_env.sensor import CATALOGUE, SensorModel
 from spikecam_env.types import Floats
 
+USUAL_NOISE = 1.5
+"""Times nominal, s^2 of a unit beyond which its noise is off: the electrons, or the square of the millivolts, of a unit
+20 % off."""
+
 
 @dataclass(frozen=True)
 class OffNominal:
@@ -38,23 +42,23 @@ def off_nominal(case: Case, model: SensorModel, base: BaseFit) -> OffNominal:
     shape = (128, 128)
     unit = model.draw_unit(shape, 0)
     has = {e.name: e.parameters()[CATALOGUE[e.name].strength] for e in model.effects}
-    live, usual_unit = base.live, case.settings.unit
+    live, usual_spread = base.live, case.settings.unit.usual
     ratios: dict[str, float] = {}
     shot = float(np.mean(1 / unit.electrons)) if unit.shot else 0.0
     reset = float(np.mean(unit.kappa**2))
-    if has.keys() & set(NOISE) and unusual(base.white / max(shot + reset, 1e-12), usual_unit.usual_noise):
+    if has.keys() & set(NOISE) and unusual(base.white / max(shot + reset, 1e-12), USUAL_NOISE):
         if "reset_noise" in has and base.white > shot:
             ratios["reset_noise"] = float(np.sqrt((base.white - shot) / max(reset, 1e-12)))
         else:
             ratios["shot_noise"] = (shot + reset) / max(base.white, 1e-12)
         base = replace(base, white=shot + reset)
     level = level_off(base.dark[live], unit.dark)
-    if "dark_current" in has and unusual(level, usual_unit.usual):
+    if "dark_current" in has and unusual(level, usual_spread):
         ratios["dark_current"] = level
     for what, usual in (("gain", 1.0), ("dark", level)):
         spreads = has.keys() & SPREAD_PARAMETERS[what].keys()
         values = getattr(base, what)
-        if spreads and unusual(width(values[live]) / max(width(getattr(unit, what)), 1e-12), usual_unit.usual):
+        if spreads and unusual(width(values[live]) / max(width(getattr(unit, what)), 1e-12), usual_spread):
             factor = spread_factor(model, what, width(values[live]), shape, 0)
             ratios |= {name: factor * usual for name in has if name in spreads}
             base = replace(base, **{what: narrowed(values, live, factor)})  # type: ignore[arg-type]

@@ -5,7 +5,6 @@ from __future__ import annotations
 import numpy as np
 
 from spikecam_env.gap.baseline.contradiction import Contradiction
-from spikecam_env.gap.settings import Searching
 from spikecam_env.gap.statistics.film import refitted_film
 from spikecam_env.gap.twins.case import Case
 from spikecam_env.types import Floats
@@ -17,13 +16,22 @@ ORIENTATIONS = {
     "turned by 180 degrees": (_BACK, _BACK),
 }
 
+LEAST_SPIKES = 1000
+"""Spikes of a recording whose orientation says something."""
+
+LEAST_CORRELATION = 0.2
+"""Correlation with its light of a recording that was turned, once corrected."""
+
+GAIN = 0.5
+"""Of what the correlation lacks to 1, what a turn gains."""
+
 
 def flipped(case: Case, suspect: set[str]) -> list[Contradiction]:
     """Recordings that fit their light and the unit's pattern upside down or mirrored."""
     found = []
     for i, c in enumerate(case.conditions):
         pictures = _seen_and_expected(case, i)
-        turn = _better_turn(*pictures, case.settings.searching) if pictures else None
+        turn = _better_turn(*pictures) if pictures else None
         if turn:
             name, turned, right = turn
             text = f"{c.name}: {name} (correlation with its light {right:.2f}, once corrected {turned:.2f})"
@@ -33,8 +41,8 @@ def flipped(case: Case, suspect: set[str]) -> list[Contradiction]:
 
 def _seen_and_expected(case: Case, i: int) -> tuple[Floats, Floats] | None:
     """(n, H, W) of recording i: its film and that of the refitted unit, or its rates and those of the other flats."""
-    c, o, least = case.conditions[i], case.observations[i], case.settings.searching.least_spikes
-    if c.light is None or o.times.count.sum() < least:
+    c, o = case.conditions[i], case.observations[i]
+    if c.light is None or o.times.count.sum() < LEAST_SPIKES:
         return None
     if o.film is not None:
         seen = o.film.reshape(-1, *case.shape).astype(np.float64)
@@ -42,7 +50,7 @@ def _seen_and_expected(case: Case, i: int) -> tuple[Floats, Floats] | None:
     others = [
         p.rate
         for j, p in enumerate(case.observations)
-        if j != i and case.conditions[j].kind == "flat" and p.times.count.sum() >= least
+        if j != i and case.conditions[j].kind == "flat" and p.times.count.sum() >= LEAST_SPIKES
     ]
     if c.kind == "dark" or not others:
         return None
@@ -50,14 +58,14 @@ def _seen_and_expected(case: Case, i: int) -> tuple[Floats, Floats] | None:
     return o.rate.reshape(1, *case.shape), expected.reshape(1, *case.shape)
 
 
-def _better_turn(seen: Floats, expected: Floats, settings: Searching) -> tuple[str, float, float] | None:
+def _better_turn(seen: Floats, expected: Floats) -> tuple[str, float, float] | None:
     """(turn, correlation turned, correlation as it is) of the first turn that agrees better, in time or summed: by no
     little correlation, and with more than half of the way to 1."""
     whole = (seen, expected), (seen.sum(axis=0)[None], expected.sum(axis=0)[None])
     for name, (rows, columns) in ORIENTATIONS.items():
         agree = [(_correlation(s[:, rows, columns], e), _correlation(s, e)) for s, e in whole]
         turned, right = max(agree, key=lambda a: a[0] - a[1])
-        if turned > settings.least_share and turned > right + settings.worth * (1.0 - max(right, 0.0)):
+        if turned > LEAST_CORRELATION and turned > right + GAIN * (1.0 - max(right, 0.0)):
             return name, turned, right
     return None
 

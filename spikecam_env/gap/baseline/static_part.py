@@ -13,6 +13,9 @@ from spikecam_env.gap.observe.conditions import Condition
 from spikecam_env.gap.observe.observation import ObservedRecording, observe
 from spikecam_env.gap.settings import DiagnosisSettings
 
+ENOUGH_STATIC = 0.3
+"""Share of static pixels that is enough to look at them alone."""
+
 
 @dataclass(frozen=True)
 class Observed:
@@ -37,7 +40,7 @@ def without_motion(
         return observed, ()
     static, moving = static_pixels(motion), {m.recording for m in motion}
     known = any(c.light is not None for c in observed.conditions if c.name in moving)
-    if not static_only or known or static.mean() < settings.concluding.large_share:
+    if not static_only or known or static.mean() < ENOUGH_STATIC:
         return Observed((), (), ()), motion
     conditions = [replace(c, static=static) if c.kind == "unknown" else c for c in observed.conditions]
     seen = [

@@ -7,9 +7,16 @@ from collections.abc import Mapping
 import numpy as np
 
 from spikecam_env.gap.candidates.table import candidate
-from spikecam_env.gap.settings import Twins
 from spikecam_env.sensor import CATALOGUE, SensorModel
 from spikecam_env.sensor.effects.base import build
+
+TARGET_SIZE = 60.0
+"""Noises by which a weak linear effect is simulated, within `MOST_EXTRAPOLATED`, and scaled down.  Statistics are in
+proportion so far: `python -m benchmarks.in_proportion`."""
+
+MOST_EXTRAPOLATED = 4.0
+"""Largest factor by which a strength, and the unit under it, are extrapolated at once.  Statistics are in proportion
+so far: `python -m benchmarks.in_proportion`."""
 
 
 def with_effect(model: SensorModel, name: str, parameters: Mapping[str, float]) -> SensorModel:
@@ -32,13 +39,13 @@ def bounded(name: str, parameters: Mapping[str, float]) -> dict[str, float]:
     return out
 
 
-def amplified(name: str, parameters: Mapping[str, float], size: float, twins: Twins) -> tuple[dict[str, float], float]:
+def amplified(name: str, parameters: Mapping[str, float], size: float) -> tuple[dict[str, float], float]:
     """(parameters, times as much) of an effect that shows by `size` noises: a weak one is amplified to the target size.
 
     Scaled down again, what twins scatter by chance is scaled with it: four times as strong is as good as sixteen times
     as many twins."""
     strength = candidate(name).strength
     linear = candidate(name).is_linear and parameters[strength] != 0
-    times = float(np.clip(twins.target_size / max(size, 1e-9), 1.0, twins.most_extrapolated)) if linear else 1.0
+    times = float(np.clip(TARGET_SIZE / max(size, 1e-9), 1.0, MOST_EXTRAPOLATED)) if linear else 1.0
     stronger = bounded(name, {**parameters, strength: parameters[strength] * times})
     return stronger, stronger[strength] / parameters[strength] if times > 1.0 else 1.0

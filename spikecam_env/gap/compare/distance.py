@@ -12,6 +12,19 @@ from spikecam_env.gap.compare.prediction import Null, Prediction, total_variance
 from spikecam_env.gap.statistics import StatisticKey
 from spikecam_env.types import Floats
 
+HEAVY = 8.0
+"""Degrees of freedom of Student's loss: statistics that are far off count by their logarithm, so that a second effect
+does not pull the fit of the first."""
+
+CLEAR = 5.0
+"""Noises by which a statistic is off that are not chance: of 600 statistics one is, in one campaign of 3000."""
+
+APART = 3.0
+"""Noises by which two simulations, or two values of a parameter, differ that are not the same."""
+
+SHOWS = 2 * APART
+"""Noises of a change that is clear of the twins' own noise."""
+
 
 def effect_size(null: Null, measured: Floats, change: Floats) -> float:
     """Largest change among the measured statistics (S,), in units of their noise."""
@@ -110,10 +123,10 @@ def residual_and_misfit(null: Null, measured: Floats, predicted: Prediction) -> 
 
 
 def loss(null: Null, rho: Floats) -> float:
-    """Heavy-tailed sum of squares of residuals (S,), by the weights and the settings of a null model."""
-    return robust_squares(rho, null.settings.judging.heavy, null.weight)
+    """Heavy-tailed sum of squares of residuals (S,), by the weights of a null model."""
+    return robust_squares(rho, null.weight)
 
 
-def robust_squares(rho: Floats, heavy: float, weight: Floats | float = 1.0) -> float:
-    """Heavy-tailed sum of squares; about the sum of the weights for noise alone.  heavy: degrees of freedom."""
-    return float(np.sum(weight * (heavy + 1.0) * np.log1p(rho**2 / heavy)))
+def robust_squares(rho: Floats, weight: Floats | float = 1.0) -> float:
+    """Heavy-tailed sum of squares (`HEAVY`); about the sum of the weights for noise alone."""
+    return float(np.sum(weight * (HEAVY + 1.0) * np.log1p(rho**2 / HEAVY)))

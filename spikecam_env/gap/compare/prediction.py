@@ -14,6 +14,10 @@ from spikecam_env.gap.statistics import StatisticKey, floor_of
 from spikecam_env.gap.unit.refit import BaseFit
 from spikecam_env.types import Floats
 
+TOLERANCE = 0.05
+"""Error of an effect's simulated change, relative: laws of first order in sub-frame time, beside a camera's.  More
+twins do not make it smaller."""
+
 PAIR_NOISE = {"rates": 0.15, "noise": 0.2, "rows": 0.3, "intervals": 0.5, "neighbours": 0.5, "drift": 0.6,
               "spectrum": 0.7, "timing": 1.0, "step": 1.2, "moving": 1.2}  # fmt: skip
 """Noise of a pair of twins of the same draws, with and without an effect, over a campaign's noise, by group
@@ -171,7 +175,7 @@ def total_variance(null: Null, predicted: Prediction) -> Floats:
 
 def law_error(null: Null, predicted: Prediction) -> Floats:
     """(S,) error of a prediction's laws."""
-    return null.settings.judging.tolerance * (predicted.mean - null.mean if predicted.own is None else predicted.own)
+    return TOLERANCE * (predicted.mean - null.mean if predicted.own is None else predicted.own)
 
 
 def pooled(keys: Sequence[StatisticKey], values: Floats) -> Floats:

@@ -7,8 +7,9 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from spikecam_env.gap.compare.distance import residual_and_misfit, robust_squares
+from spikecam_env.gap.compare.distance import APART, HEAVY, SHOWS, residual_and_misfit, robust_squares
 from spikecam_env.gap.compare.prediction import (
+    TOLERANCE,
     Null,
     Prediction,
     from_drawn_units,
@@ -17,12 +18,15 @@ from spikecam_env.gap.compare.prediction import (
     total_variance,
     with_change_scaled,
 )
-from spikecam_env.gap.settings import Judging
 from spikecam_env.types import Floats
 
 ERROR_DAMPING = 5e-4
 """Damping of the normal matrix that errors follow from: a step may be held back, an error must not be.  What it holds
 back is open."""
+
+AS_WELL = 0.5
+"""Share of its size on the best statistic from which an effect counts that is clear on none; of one that shows clearly,
+the square of this."""
 
 MEDIAN_SQUARE = 0.455
 """Of the square of a normal deviate."""
@@ -57,11 +61,11 @@ def step_of(
     Where two parameters do nearly the same, noise of the jacobian would seem to separate them: the squares of it
     that are expected in the normal matrix are subtracted (errors in variables).
     """
-    noise2, heavy = total_variance(null, predicted), null.settings.judging.heavy
+    noise2 = total_variance(null, predicted)
     gap = np.nan_to_num(measured - predicted.mean)
     concerned = np.isfinite(measured) & np.any(jacobian != 0, axis=1)
     usual = max(float(np.median((gap**2 / noise2)[concerned])) / MEDIAN_SQUARE, 1.0) if concerned.any() else 1.0
-    w = np.isfinite(measured) * null.weight * (heavy + 1) / (heavy + gap**2 / noise2 / usual) / noise2
+    w = np.isfinite(measured) * null.weight * (HEAVY + 1) / (HEAVY + gap**2 / noise2 / usual) / noise2
     normal = jacobian.T @ (w[:, None] * jacobian)
     scale = np.diag(normal) + 1e-12
     step = np.linalg.solve(normal + 0.02 * np.diag(scale), jacobian.T @ (w * gap))
@@ -133,23 +137,23 @@ def change_of(
         apart = there.units - here.units
         own2 = np.where(np.isfinite(apart).all(axis=0), apart.var(axis=0, ddof=1) / len(apart), own2)
     own2 = np.maximum(own2, 1e-300)
-    judging = null.settings.judging
     here_known, elsewhere = np.where(known, change, 0.0), np.where(known, 0.0, change)
-    clear = is_clear(here_known, own2, judging) | is_clear(elsewhere, own2, judging)
+    clear = is_clear(here_known, own2) | is_clear(elsewhere, own2)
     return change, np.sqrt(own2), clear
 
 
-def scale_of(gap: Floats, effect: Floats, of_gap: Floats, of_effect: Floats, judging: Judging) -> tuple[float, float]:
+def scale_of(
+    gap: Floats, effect: Floats, of_gap: Floats, of_effect: Floats, tolerance: float = TOLERANCE
+) -> tuple[float, float]:
     """(scale, sd): by how much to multiply an effect's change of the statistics to come nearest to the measured one.
 
-    gap, effect: (S,) measured and simulated change.  of_gap, of_effect: (S,) their variances.  judging: the loss, and
-    the tolerance of the effect.
+    gap, effect: (S,) measured and simulated change.  of_gap, of_effect: (S,) their variances.  tolerance: error
+    of the effect, relative.
     Only statistics on which the simulated effect is clear of its own noise count: the noise of the others would drag
     the scale to 0 (regression dilution).  Under a heavy-tailed loss there are many minima: it is followed down from
     every ratio that many statistics agree on.
     """
-    heavy, tolerance = judging.heavy, judging.tolerance
-    clear = is_clear(effect, of_gap + of_effect, judging)
+    clear = is_clear(effect, of_gap + of_effect)
     if not clear.any():
         return 0.0, np.inf
     gap, effect, of_gap, of_effect = gap[clear], effect[clear], of_gap[clear], of_effect[clear]
@@ -159,11 +163,11 @@ def scale_of(gap: Floats, effect: Floats, of_gap: Floats, of_effect: Floats, jud
         scale, total = float(start), 0.0
         for _ in range(8):
             noise2 = of_gap + scale**2 * of_effect + (tolerance * scale * effect) ** 2
-            w = (heavy + 1.0) / (heavy + (gap - scale * effect) ** 2 / noise2) / noise2
+            w = (HEAVY + 1.0) / (HEAVY + (gap - scale * effect) ** 2 / noise2) / noise2
             total = float(np.sum(w * effect**2))
             scale = float(np.sum(w * effect * gap)) / max(total, 1e-300)
         noise2 = of_gap + scale**2 * of_effect + (tolerance * scale * effect) ** 2
-        left = robust_squares((gap - scale * effect) / np.sqrt(noise2), heavy)
+        left = robust_squares((gap - scale * effect) / np.sqrt(noise2))
         best = min(best, (left, scale, 1.0 / np.sqrt(max(total, 1e-300))))
     return best[1], best[2]
 
@@ -172,13 +176,13 @@ def scale_to(null: Null, measured: Floats, predicted: Prediction) -> tuple[float
     """(scale, sd) of a prediction's change from the null that comes nearest to the measured one."""
     known = np.isfinite(measured)
     gap, effect = (np.where(known, v - null.mean, 0.0) for v in (measured, predicted.mean))
-    return scale_of(gap, effect, null.noise**2, own_variance(null, predicted), null.settings.judging)
+    return scale_of(gap, effect, null.noise**2, own_variance(null, predicted))
 
 
-def is_clear(effect: Floats, variance: Floats, judging: Judging) -> NDArray[np.bool_]:
+def is_clear(effect: Floats, variance: Floats) -> NDArray[np.bool_]:
     """(S,) whether an effect stands clear of noise on a statistic, or, where it does on none, nearly as well as on its
     best: of 600 statistics a few are 4 noises off by chance."""
     size = np.abs(effect) / np.sqrt(variance)
     most = float(size.max())
-    least = max(min(judging.apart, judging.as_well * most), min(judging.shows, judging.as_well**2 * most))
+    least = max(min(APART, AS_WELL * most), min(SHOWS, AS_WELL**2 * most))
     return np.asarray((size > least) & (effect != 0))

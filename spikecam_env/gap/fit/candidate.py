@@ -7,22 +7,36 @@ other parameters are of `shapes`.  The unit is refitted along the way, so that t
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
 
-from spikecam_env.gap.candidates.strength import amplified, bounded, with_effect
+from spikecam_env.gap.candidates.strength import MOST_EXTRAPOLATED, TARGET_SIZE, amplified, bounded, with_effect
 from spikecam_env.gap.candidates.table import candidate
 from spikecam_env.gap.compare.distance import effect_size
 from spikecam_env.gap.compare.prediction import Prediction, with_change_scaled
 from spikecam_env.gap.compare.step import likeliest, scale_to, slope_of, step_of
+from spikecam_env.gap.fit.gauss_newton import COMPARED, LONGEST_STEP, MOST_STEPS, SMALL_STEP
 from spikecam_env.gap.fit.problem import Problem
-from spikecam_env.gap.fit.recordings import twins_of
+from spikecam_env.gap.fit.recordings import OF_RANDOM_COURSE, twins_of
 from spikecam_env.gap.unit.indirect_inference import extrapolated_unit, has_converged
 from spikecam_env.gap.unit.refit import BaseFit, constrained_refit
 from spikecam_env.sensor import SensorModel
 from spikecam_env.types import Floats
+
+VISIBLE = 4.0
+"""Least size of a simulated effect [noises] from which its strength is scaled."""
+
+MOST_TRIES = MOST_STEPS + 1
+"""Strengths that are tried for one strength: one more than the steps between them."""
+
+ROUND_OFF = (math.exp(-LONGEST_STEP / 2), math.exp(LONGEST_STEP / 2))
+"""Factors within which a strength is scaled without another twin."""
+
+LARGEST_FACTOR = math.exp(LONGEST_STEP)
+"""Factor by which starts are scaled to compare them, or one that mostly scatters without other twins."""
 
 LEAST_FACTOR = 1e-3
 """Least factor by which a strength is multiplied at once; and that of a strength whose fit does not go on."""
@@ -70,31 +84,30 @@ def _fit_twins(problem: Problem, name: str, parameters: dict[str, float], expect
     strength is right to a third and the unit has settled; the last step is a scaling of what was simulated, without
     another twin."""
     what, null, seen = candidate(name), problem.null, problem.seen
-    fitting, how = problem.settings.fitting, problem.settings.twins
     strength, power = what.strength, what.power
     expected = np.full(len(null.keys), np.inf) if expected is None else expected
-    parameters, times = amplified(name, bounded(name, parameters), effect_size(null, seen, expected), how)
+    parameters, times = amplified(name, bounded(name, parameters), effect_size(null, seen, expected))
     start = constrained_refit(problem.model, problem.case.base)
     bare = constrained_refit(with_effect(problem.model, name, parameters), start)
     base = replace(bare, white=white**times * bare.white)
-    least = problem.misfit() - problem.settings.deviance.compare
+    least = problem.misfit() - COMPARED
     only = problem.affected([name], expected * times)
     last: tuple[float, Prediction] | None = None
     slope: Floats | None = None
     settled_once = False
-    for turn in range(fitting.most_tries):
-        at_last = turn == fitting.most_tries - 1
+    for turn in range(MOST_TRIES):
+        at_last = turn == MOST_TRIES - 1
         tried = with_effect(problem.model, name, parameters)
-        predicted = problem.predict(tried, base, twins_of(name, how), only)
+        predicted = problem.predict(tried, base, twins_of(name), only)
         size = effect_size(null, seen, predicted.mean - null.mean)
-        stronger = parameters if at_last else until_visible(name, parameters, size, fitting.visible)
+        stronger = parameters if at_last else until_visible(name, parameters, size)
         if stronger != parameters:
             times = abs(stronger[strength] / parameters[strength]) ** power
-            base = extrapolated_unit(bare, base, times, how.most_extrapolated)
+            base = extrapolated_unit(bare, base, times, MOST_EXTRAPOLATED)
             parameters, only = stronger, problem.affected([name])
             continue
         assumed, base = base, problem.settled_unit(tried, base, predicted)
-        if not settled_once and not at_last and not has_converged(assumed, base, how.converged):
+        if not settled_once and not at_last and not has_converged(assumed, base):
             settled_once = True
             continue
         scale, sd = scale_to(null, seen, predicted)
@@ -104,16 +117,16 @@ def _fit_twins(problem: Problem, name: str, parameters: dict[str, float], expect
         now = parameters[strength], predicted
         slope = slope_between(problem, last, now) if power == 2.0 else None
         factor, last = factor_to(problem, name, predicted, scale, slope), now
-        weak = abs(scale) * size < fitting.visible or (
-            what.is_linear and 1 / how.most_extrapolated < scale < 1 and scale * size < how.target_size
+        weak = abs(scale) * size < VISIBLE or (
+            what.is_linear and 1 / MOST_EXTRAPOLATED < scale < 1 and scale * size < TARGET_SIZE
         )
-        near = weak or fitting.round_off[0] < factor < fitting.round_off[1]
+        near = weak or ROUND_OFF[0] < factor < ROUND_OFF[1]
         if at_last or (near and turn):
             break
         if weak:
             continue
         parameters = bounded(name, {**parameters, strength: parameters[strength] * factor})
-        base = extrapolated_unit(bare, base, factor**power, how.most_extrapolated)
+        base = extrapolated_unit(bare, base, factor**power, MOST_EXTRAPOLATED)
         only = problem.affected([name], (predicted.mean - null.mean) * factor**power)
     final = bounded(name, {**parameters, strength: parameters[strength] * factor}) if near else parameters
     moved = (final[strength] / parameters[strength]) ** power if parameters[strength] else 1.0
@@ -124,17 +137,17 @@ def _fit_twins(problem: Problem, name: str, parameters: dict[str, float], expect
     rho, left = problem.residual_and_misfit(predicted)
     sds = {strength: abs(final[strength]) * (sd / max(abs(scale), 1e-9) / power)}
     there = with_effect(problem.model, name, final)
-    unit = extrapolated_unit(bare, base, moved, how.most_extrapolated)
+    unit = extrapolated_unit(bare, base, moved, MOST_EXTRAPOLATED)
     return Fit(name, final, sds, predicted, unit, rho, left, there)
 
 
-def until_visible(name: str, parameters: dict[str, float], size: float, visible: float) -> dict[str, float]:
-    """The parameters at a strength that shows by twice `visible` noises, or where its bounds end; as they are where it
+def until_visible(name: str, parameters: dict[str, float], size: float) -> dict[str, float]:
+    """The parameters at a strength that shows by twice `VISIBLE` noises, or where its bounds end; as they are where it
     shows.  size: noises that it shows by."""
-    if size >= visible:
+    if size >= VISIBLE:
         return parameters
     strength = candidate(name).strength
-    more = (2 * visible / max(size, 0.2)) ** (1 / candidate(name).power)
+    more = (2 * VISIBLE / max(size, 0.2)) ** (1 / candidate(name).power)
     return bounded(name, {**parameters, strength: parameters[strength] * more})
 
 
@@ -155,11 +168,7 @@ def slope_between(
 ) -> Floats | None:
     """(S,) change of the statistics for one more of a strength's logarithm, by twins at two of them; None where these
     are not two.  What goes with the square of a strength saturates where other noise is, or is a logarithm of both."""
-    if (
-        one is None
-        or not one[0] * other[0] > 0
-        or abs(step := float(np.log(other[0] / one[0]))) < problem.settings.fitting.small_step
-    ):
+    if one is None or not one[0] * other[0] > 0 or abs(step := float(np.log(other[0] / one[0]))) < SMALL_STEP:
         return None
     null = problem.null
     both = (one[1].mean != null.mean) & (other[1].mean != null.mean)
@@ -173,14 +182,14 @@ def _fit_random_course(problem: Problem, name: str, parameters: dict[str, float]
     Statistics of one recording are of one course in time: its strength is known no better than from one number each.
     """
     strength, power = candidate(name).strength, candidate(name).power
-    only, most = problem.affected([name]), problem.settings.fitting.largest_factor
+    only = problem.affected([name])
     for _ in range(2):
         there = with_effect(problem.model, name, bounded(name, parameters))
         base = constrained_refit(there, problem.case.base)
-        predicted = problem.predict(there, base, problem.settings.twins.of_random_course, only)
+        predicted = problem.predict(there, base, OF_RANDOM_COURSE, only)
         factor, sd = likeliest(problem.null, problem.seen, predicted)
         parameters = bounded(name, {**parameters, strength: parameters[strength] * factor ** (1 / power)})
-        if 1 / most < factor < most:
+        if 1 / LARGEST_FACTOR < factor < LARGEST_FACTOR:
             break
     predicted = with_change_scaled(problem.null, predicted, factor)
     rho, left = problem.residual_and_misfit(predicted)

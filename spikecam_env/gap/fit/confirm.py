@@ -6,16 +6,16 @@ from dataclasses import replace
 
 import numpy as np
 
-from spikecam_env.gap.candidates.strength import amplified, with_effect
+from spikecam_env.gap.candidates.strength import MOST_EXTRAPOLATED, amplified, with_effect
 from spikecam_env.gap.candidates.table import Candidates, candidate
 from spikecam_env.gap.compare.distance import effect_size
 from spikecam_env.gap.compare.prediction import Null, Prediction, with_change_scaled
 from spikecam_env.gap.fit.candidate import Fit
 from spikecam_env.gap.fit.problem import Problem
-from spikecam_env.gap.fit.recordings import twins_of, with_held_out
+from spikecam_env.gap.fit.recordings import OF_RANDOM_COURSE, twins_of, with_held_out
 from spikecam_env.gap.twins.fresh_units import drawn_response
 from spikecam_env.gap.unit.conversion import LINES
-from spikecam_env.gap.unit.indirect_inference import extrapolated_unit
+from spikecam_env.gap.unit.indirect_inference import IDENTIFIABLE, extrapolated_unit
 from spikecam_env.gap.unit.refit import BaseFit, constrained_refit
 from spikecam_env.sensor import SensorModel
 
@@ -24,19 +24,18 @@ def confirmed(problem: Problem, found: Fit, count: int | None = None) -> Fit:
     """The fit simulated with more draws, on the recordings held out as well.
 
     count: of twins, by default as many as confirm a candidate; more where its effects need more."""
-    twins = problem.settings.twins
-    count = twins.to_confirm if count is None else count
+    count = problem.settings.twins.to_confirm if count is None else count
     case, model, null = problem.case, problem.model, problem.null
     added = [e.name for e in found.model.effects if e not in model.effects]
     effects = Candidates(tuple(added))
     predicted = null.prediction
     if not (added and effects.all_pattern and not set(added) & set(LINES)):
         only = problem.affected(added or [found.name], found.prediction.mean - null.mean)
-        needed = (twins.of_random_course if c.random_course else twins_of(c.name, twins) for c in effects.each)
+        needed = (OF_RANDOM_COURSE if c.random_course else twins_of(c.name) for c in effects.each)
         count = max(count, *needed, 1)
         there = with_held_out(case, only)
         stronger, times = found, 1.0
-        severe = found.base.white < problem.settings.unit.identifiable * case.base.white
+        severe = found.base.white < IDENTIFIABLE * case.base.white
         if len(added) == 1 and not severe and not candidate(added[0]).is_pattern:
             stronger, times = amplified_fit(problem, found, added[0])
         predicted = problem.predict(stronger.model, constrained_refit(stronger.model, stronger.base), count, there)
@@ -59,20 +58,20 @@ def amplified_fit(problem: Problem, found: Fit, name: str) -> tuple[Fit, float]:
     """(fit, times as strong) with the effect that it adds to the model, and its unit, as `amplified`."""
     [effect] = [e for e in found.model.effects if e.name == name]
     size = effect_size(problem.null, problem.seen, found.prediction.mean - problem.null.mean)
-    how, bare = problem.settings.twins, constrained_refit(problem.model, problem.case.base)
-    parameters, times = amplified(name, effect.parameters(), size, how)
-    base = extrapolated_unit(bare, found.base, times, how.most_extrapolated)
+    bare = constrained_refit(problem.model, problem.case.base)
+    parameters, times = amplified(name, effect.parameters(), size)
+    base = extrapolated_unit(bare, found.base, times, MOST_EXTRAPOLATED)
     return replace(found, model=with_effect(found.model, name, parameters), base=base), times
 
 
 def attenuated(null: Null, stronger: Prediction, times: float) -> Prediction:
     """A prediction of an effect simulated `times` as strong, and its draws, brought down to its strength."""
-    without, most = {d.number: d for d in null.draws}, null.settings.twins.most_extrapolated
+    without = {d.number: d for d in null.draws}
     draws = tuple(
         replace(
             d,
             values=w.values + (d.values - w.values) / times,
-            refit=extrapolated_unit(w.refit, d.refit, 1 / times, most) if w.refit and d.refit else d.refit,
+            refit=extrapolated_unit(w.refit, d.refit, 1 / times, MOST_EXTRAPOLATED) if w.refit and d.refit else d.refit,
         )
         for d, w in ((d, without[d.number]) for d in stronger.draws)
     )

@@ -14,6 +14,7 @@ import numpy as np
 
 from spikecam_env.gap.candidates.strength import bounded, with_effect
 from spikecam_env.gap.candidates.table import candidate
+from spikecam_env.gap.compare.distance import APART, SHOWS
 from spikecam_env.gap.compare.prediction import Null, Prediction, own_variance
 from spikecam_env.gap.compare.step import change_of, step_of
 from spikecam_env.gap.fit.coordinates import moved_value
@@ -26,6 +27,25 @@ from spikecam_env.types import Floats
 
 PROBES = 2
 """Times that a model is probed: under the unit there was, and under the one that it then shows."""
+
+STOP = 1.0
+"""Least misfit that another step has to promise.  Small, since two parameters that compensate each other may both be
+far off while a step gains little."""
+
+COMPARED = 5 * STOP
+"""As `STOP`, while candidates are compared: less would not change their order."""
+
+MOST_STEPS = 4
+"""Steps of a descent, and of effects that start together."""
+
+SMALL_STEP = 0.05
+"""Step of a logarithm that needs no other; two strengths so close show no slope."""
+
+LONG_STEP = 0.5
+"""Step of a logarithm beyond which derivatives are taken anew."""
+
+LONGEST_STEP = 0.7
+"""Largest step of a logarithm at once, a factor of two, within what was open of the parameter before."""
 
 WHITE = ("the unit", "white")
 """The unit's own s^2, among parameters by effect and name, where an effect hides it."""
@@ -58,7 +78,7 @@ class Descent:
 
 
 def descend(
-    problem: Problem, probe: Probe, model: SensorModel, base: BaseFit, free: Free, to_step: float | None = None
+    problem: Problem, probe: Probe, model: SensorModel, base: BaseFit, free: Free, to_step: float = STOP
 ) -> Descent:
     """From a model and its unit down to the parameters `free` that suit what is seen best.
 
@@ -67,32 +87,31 @@ def descend(
     to_step: misfit that a step has to promise, and the one before it to have removed; by default that of an effect
     that was chosen.
     """
-    null, fitting, deviance = problem.null, problem.settings.fitting, problem.settings.deviance
-    to_step = deviance.stop if to_step is None else to_step
+    null = problem.null
     at, base = at_settled_unit(probe, null, model, base, free)
     columns, noise = derivatives(problem, probe, model, base, at, free)
-    before, longest = prior_sd(free), longest_of(free, fitting.longest_step)
+    before, longest = prior_sd(free), longest_of(free)
     tried = []
-    for turn in range(fitting.most_steps):
+    for turn in range(MOST_STEPS):
         step, covariance = step_of(null, problem.seen, at, columns, noise, before)
         step = np.clip(step, -longest, longest)
         left, promised = (problem.misfit(p) for p in (at, replace(at, mean=at.mean + columns @ step)))
         tried.append((left, Descent(model, base, at, columns, noise, covariance)))
         model, base = moved(model, unit_after(model, base, null, at, free), free, step)
         little = left - promised < to_step or (turn > 0 and 0 <= tried[-2][0] - left < to_step)
-        if turn == fitting.most_steps - 1 or little or np.all(np.abs(step) < fitting.small_step):
+        if turn == MOST_STEPS - 1 or little or np.all(np.abs(step) < SMALL_STEP):
             break
         after, base = at_settled_unit(probe, null, model, base, free)
-        if np.abs(step).max() < fitting.long_step:
+        if np.abs(step).max() < LONG_STEP:
             own = np.sqrt(own_variance(null, at) + own_variance(null, after))
-            columns = broyden(columns, step, after.mean - at.mean, problem.settings.judging.apart * own)
+            columns = broyden(columns, step, after.mean - at.mean, APART * own)
         else:
             columns, noise = derivatives(problem, probe, model, base, after, free)
         at = after
     least = min(t[0] for t in tried)
     guess = little and bool(np.any(np.abs(step) >= longest))
-    if guess or left > least + deviance.by_chance:
-        return next(where for there, where in tried if there < least + deviance.stop)
+    if guess or left > least + problem.settings.deviance.by_chance:
+        return next(where for there, where in tried if there < least + STOP)
     return Descent(model, base, replace(at, mean=at.mean + columns @ step), columns, noise, covariance)
 
 
@@ -125,7 +144,7 @@ def derivatives(
     is.  What one parameter of an effect clearly moves says of its others that they do not, or how far."""
     null = problem.null
     peak = float(np.max(np.abs(at.mean - null.mean) / null.noise))
-    sizes = np.array([derivative_step(name, key, peak, problem.settings.judging.shows) for name, key in free])
+    sizes = np.array([derivative_step(name, key, peak) for name, key in free])
     with ThreadPoolExecutor(problem.case.jobs) as pool:
         steps = [moved(model, base, [what], np.array([size])) for what, size in zip(free, sizes, strict=True)]
         there = [made for made, _ in pool.map(lambda step: at_settled_unit(probe, null, step[0], step[1], free), steps)]
@@ -142,7 +161,7 @@ def at_settled_unit(
     """(what a model gives under a unit that has settled, that unit): probed once more where it had not."""
     made = probe(model, base)
     there = unit_after(model, base, null, made, free)
-    return (made, base) if has_converged(base, there, null.settings.twins.converged) else (probe(model, there), there)
+    return (made, base) if has_converged(base, there) else (probe(model, there), there)
 
 
 def unit_after(model: SensorModel, base: BaseFit, null: Null, made: Prediction, free: Free) -> BaseFit:
@@ -160,18 +179,18 @@ def prior_sd(free: Free) -> Floats:
     )
 
 
-def longest_of(free: Free, longest: float) -> Floats:
-    """(n,) largest step of each logarithm at once: `longest`, and no further than what was open of it before."""
-    return np.minimum(prior_sd(free), longest)
+def longest_of(free: Free) -> Floats:
+    """(n,) largest step of each logarithm at once: `LONGEST_STEP`, and no further than what was open of it before."""
+    return np.minimum(prior_sd(free), LONGEST_STEP)
 
 
-def derivative_step(name: str, key: str, peak: float, shows: float) -> float:
+def derivative_step(name: str, key: str, peak: float) -> float:
     """Step of a logarithm to take a derivative by, long enough to show above the twins' own noise.
 
-    peak: noises by which the effect shows.  shows: noises by which the step is to.
+    peak: noises by which the effect shows.
     """
     if (name, key) == WHITE:
         return WHITE_STEP
     if key != candidate(name).strength:
         return candidate(name).shape_step
-    return float(np.clip(shows / max(peak, 1e-9), *STRENGTH_STEPS))
+    return float(np.clip(SHOWS / max(peak, 1e-9), *STRENGTH_STEPS))

@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from spikecam_env.gap.candidates.table import Candidates, candidate
+from spikecam_env.gap.compare.distance import APART
 from spikecam_env.gap.compare.prediction import Prediction
 from spikecam_env.gap.fit.candidate import Fit
 from spikecam_env.gap.fit.confirm import confirmed
@@ -19,6 +20,9 @@ from spikecam_env.gap.fit.recordings import twins_of, with_held_out
 from spikecam_env.gap.unit.refit import BaseFit, constrained_refit
 from spikecam_env.sensor import SensorModel
 from spikecam_env.types import Floats
+
+OWN_SHARE = 0.9
+"""Of the refit's s^2: a unit with a smaller share of its own is fitted with the effects."""
 
 
 def refined_together(problem: Problem, found: Fit, names: Sequence[str]) -> tuple[Fit, Errors, bool]:
@@ -38,7 +42,7 @@ def refined_together(problem: Problem, found: Fit, names: Sequence[str]) -> tupl
         return open_, errors, False
     whole, known, _ = _refined(everywhere, refined, names)
     suit = everywhere.is_explained(open_.prediction) or everywhere.is_explained(whole.prediction)
-    if not (suit and agree(refined, whole, errors, problem.settings.judging.apart)):
+    if not (suit and agree(refined, whole, errors, APART)):
         return open_, errors, False
     return replace(whole, misfit=problem.misfit(whole.prediction)), known, True
 
@@ -47,7 +51,7 @@ def _refined(problem: Problem, found: Fit, names: Sequence[str]) -> tuple[Fit, E
     """The fit, its errors, and (S,) by what variance statistics are unknown for them (`last_step`).
 
     Of what is not refined (`to_refine`), as of the others, derivatives are then taken anew for the last step."""
-    settings, probe = problem.settings, _probe(problem, found, names)
+    probe = _probe(problem, found, names)
     free = to_refine(problem, found, names)
     held = [parameter for parameter in fitted_of(names) if parameter not in free]
     free += [WHITE] if is_noisy(problem, found.base) else []
@@ -55,8 +59,8 @@ def _refined(problem: Problem, found: Fit, names: Sequence[str]) -> tuple[Fit, E
     if free:
         end = descend(problem, probe, now, base, free)
         now, base, slopes = end.model, end.base, Slopes.of_descent(free, end.columns, end.noise)
-    best = confirmed(problem, replace(found, model=now, base=base), settings.twins.in_the_end)
-    if best.misfit > problem.misfit(found.prediction) + settings.deviance.by_chance:
+    best = confirmed(problem, replace(found, model=now, base=base), problem.settings.twins.in_the_end)
+    if best.misfit > problem.misfit(found.prediction) + problem.settings.deviance.by_chance:
         best = found
     if held or slopes is None:
         slopes = Slopes.at(problem, probe, best, free + held)
@@ -93,8 +97,8 @@ def fitted_of(names: Sequence[str]) -> list[tuple[str, str]]:
 
 
 def is_noisy(problem: Problem, base: BaseFit) -> bool:
-    """Whether effects take so much of the refit's s^2 that the unit `base` has less than `own_share` of it."""
-    return 0 < base.white < problem.settings.unit.own_share * problem.case.base.white
+    """Whether effects take so much of the refit's s^2 that the unit `base` has less than `OWN_SHARE` of it."""
+    return 0 < base.white < OWN_SHARE * problem.case.base.white
 
 
 def to_refine(problem: Problem, found: Fit, names: Sequence[str]) -> list[tuple[str, str]]:
@@ -117,7 +121,7 @@ def simulated_for(problem: Problem, found: Fit, names: Sequence[str]) -> tuple[l
     if Candidates(tuple(names)).all_pattern:
         return [], 1
     only = with_held_out(problem.case, problem.affected(names, found.prediction.mean - problem.null.mean))
-    return only, max(twins_of(name, problem.settings.twins) for name in names)
+    return only, max(twins_of(name) for name in names)
 
 
 def no_smaller(known: Mapping[str, float], before: Mapping[str, float]) -> dict[str, float]:

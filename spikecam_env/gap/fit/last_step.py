@@ -126,7 +126,7 @@ def curvature_of_step(free: Free, taken: Floats) -> Floats:
 def _stepped(problem: Problem, best: Fit, slopes: Slopes, step: Floats) -> tuple[Fit, Floats]:
     """(the fit moved, (n,) the step taken): none that leaves more.  After a descent none longer than one of a descent;
     without, as far as that goes.  What one twin happened to scatter is in the parameters that it led to."""
-    longest = longest_of(slopes.free, problem.settings.fitting.longest_step)
+    longest = longest_of(slopes.free)
     step = np.clip(step, -longest, longest) if slopes.once else step
     predicted = replace(best.prediction, mean=best.prediction.mean + slopes.columns @ step)
     rho, left = problem.residual_and_misfit(predicted)

@@ -56,4 +56,4 @@ def settled_unit(model: SensorModel, base: BaseFit, null: Null, predicted: Predi
     there = predicted.draws[-1].refit
     if not (without and there):
         return base
-    return inferred_unit(model, base, without, [there], null.settings.unit.identifiable)
+    return inferred_unit(model, base, without, [there])

@@ -7,17 +7,23 @@ from collections.abc import Sequence
 import numpy as np
 
 from spikecam_env.gap.candidates.table import Candidates, candidate
+from spikecam_env.gap.compare.distance import CLEAR
 from spikecam_env.gap.compare.prediction import Null
-from spikecam_env.gap.settings import Twins
 from spikecam_env.gap.twins.case import Case, refit_recordings
 from spikecam_env.types import Floats
 
+OF_EVENTS = 3
+"""Twins of a sparse or mixed effect."""
 
-def twins_of(name: str, settings: Twins) -> int:
+OF_RANDOM_COURSE = 2 * OF_EVENTS
+"""Twins of an effect of random course: their scatter counts."""
+
+
+def twins_of(name: str) -> int:
     """Number of twins for an effect: several of a sparse one (few events, few random pixels) or a `mixed` one, which
     cannot be simulated stronger to exceed one twin's noise, so that several are averaged."""
     what = candidate(name)
-    return settings.of_events if what.events or what.few_pixels or what.mixed else 1
+    return OF_EVENTS if what.events or what.few_pixels or what.mixed else 1
 
 
 def recordings_affected(case: Case, names: Sequence[str], null: Null, measured: Floats, effect: Floats) -> list[int]:
@@ -27,7 +33,7 @@ def recordings_affected(case: Case, names: Sequence[str], null: Null, measured: 
     Of effects that leave steady uniform light alone, only the others, where the refit does not rest on them.
     """
     off = np.maximum(np.abs(effect), np.abs(np.nan_to_num(measured - null.mean)))
-    seen = off > null.settings.judging.clear * null.noise
+    seen = off > CLEAR * null.noise
     shows = {k.recording for k, s in zip(null.keys, seen, strict=True) if s}
     fitted = {i for i, c in enumerate(case.conditions) if c.use == "fit"}
     which = {i for i in fitted if case.conditions[i].name in shows} or fitted

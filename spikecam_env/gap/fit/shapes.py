@@ -15,11 +15,14 @@ from spikecam_env.gap.compare.distance import is_significant
 from spikecam_env.gap.compare.prediction import Prediction
 from spikecam_env.gap.fit.candidate import Fit
 from spikecam_env.gap.fit.coordinates import error_of
-from spikecam_env.gap.fit.gauss_newton import Descent, Free, descend
+from spikecam_env.gap.fit.gauss_newton import COMPARED, Descent, Free, descend
 from spikecam_env.gap.fit.problem import Problem
 from spikecam_env.gap.fit.recordings import twins_of
 from spikecam_env.gap.unit.refit import BaseFit, constrained_refit
 from spikecam_env.sensor import SensorModel
+
+WORTH = 0.5
+"""Of what the best removes: less is not worth another fit, of a start, a shape, or a runner-up of an earlier effect."""
 
 
 def with_shapes_to_fit(problem: Problem, before: float, fits: Sequence[Fit]) -> list[Fit]:
@@ -32,7 +35,7 @@ def with_shapes_to_fit(problem: Problem, before: float, fits: Sequence[Fit]) -> 
     simple = min((f for f in fits if not candidate(f.name).has_shapes), key=lambda f: f.misfit, default=None)
     explained = simple is not None and not is_significant(problem.null, simple.rho, simple.prediction)
     enough = simple.misfit if simple and explained else np.inf
-    near = before - problem.settings.searching.worth * (before - least)
+    near = before - WORTH * (before - least)
     return [f for f in fits if candidate(f.name).has_shapes and f.misfit < min(near, enough)]
 
 
@@ -40,13 +43,13 @@ def with_fitted_shapes(problem: Problem, found: Fit, names: Sequence[str] = ()) 
     """The fit with all that is fitted of its candidate at its best; or of several effects `names`, at once."""
     names = names or (found.name,)
     only = problem.affected(names, found.prediction.mean - problem.null.mean)
-    count = max(twins_of(name, problem.settings.twins) for name in names)
+    count = max(twins_of(name) for name in names)
 
     def probe(there: SensorModel, base: BaseFit) -> Prediction:
         return problem.predict(there, constrained_refit(there, base), count, only)
 
     free = [(name, key) for name in names for key in candidate(name).fitted]
-    end = descend(problem, probe, found.model, found.base, free, problem.settings.deviance.compare)
+    end = descend(problem, probe, found.model, found.base, free, COMPARED)
     shaped = where_ended(problem, found, end, free)
     return found if shaped.misfit > found.misfit else shaped
 

@@ -35,6 +35,9 @@ from spikecam_env.gap.unit.usual import unusual
 from spikecam_env.sensor import CATALOGUE, SensorModel
 from spikecam_env.types import Floats
 
+LARGEST_SD = 0.5
+"""Relative standard deviation of a strength up to which its effect is there: 2 standard deviations from 0."""
+
 MOST_RELATIVE_SD = 10.0
 """Standard deviation of a parameter's logarithm from which no error is stated: of an effect that does nothing."""
 
@@ -98,7 +101,7 @@ def significant_effects(
     """The best of each round after the first, where its strength is significant in the end."""
     found = []
     for fits in rounds[1:]:
-        if has_clear_strength(rounds[-1][0], fits[0].name, case.settings.searching.largest_sd):
+        if has_clear_strength(rounds[-1][0], fits[0].name, LARGEST_SD):
             instead = {f.name: gap_of_maps(case, null, values, f.predicted).removed for f in fits[1:]}
             found.append(named_effect(fits, rounds[-1][0], instead))
     return tuple(found)
@@ -121,7 +124,7 @@ def patched_model(case: MapCase, tested: SensorModel, last: MapFit | None) -> Se
     if last is None:
         return tested
     patched = at_measured_dark(last.state, case)
-    for name in (n for n in last.state.added if not has_clear_strength(last, n, case.settings.searching.largest_sd)):
+    for name in (n for n in last.state.added if not has_clear_strength(last, n, LARGEST_SD)):
         patched = patched.without(name)
     return patched
 

@@ -16,13 +16,16 @@ from numpy.typing import NDArray
 
 from spikecam_env.gap.candidates.strength import bounded, with_effect
 from spikecam_env.gap.candidates.table import candidate
-from spikecam_env.gap.compare.distance import is_significant, residual, robust_squares
+from spikecam_env.gap.compare.distance import HEAVY, is_significant, residual, robust_squares
 from spikecam_env.gap.compare.prediction import Null, Prediction, values_of
 from spikecam_env.gap.maps.bank import MapCase, map_bank, unit_maps, with_use
 from spikecam_env.gap.statistics import StatisticKey
 from spikecam_env.gap.twins.fresh_units import SPREAD_PARAMETERS as UNIT_SPREADS
 from spikecam_env.sensor import CATALOGUE, SensorModel
 from spikecam_env.types import Floats
+
+STEPS = 6
+"""Steps of a fit."""
 
 FITTED_SPREADS = {"response": UNIT_SPREADS["gain"], "dark": UNIT_SPREADS["dark"]}
 """What is scaled to fit how pixels differ: parameters of effects, by what they spread."""
@@ -129,12 +132,12 @@ def fit_candidate(case: MapCase, start: PatternModel, null: Null, values: Floats
         state = PatternModel(with_effect(state.model, name, default), state.factors, (*state.added, name))
     varied = [("", w) for w in FITTED_SPREADS if w in state.factors]
     varied += [(n, p) for n in state.added for p in fitted_parameters(n)]
-    use, settings, heavy = with_use(case, null.keys, "fit"), case.settings.maps, null.settings.judging.heavy
+    use, units = with_use(case, null.keys, "fit"), case.settings.maps.units
     sd = dict.fromkeys((f"{n}.{p}" for n, p in varied), np.nan)
     damping, best, least = FIRST_DAMPING, state, np.inf
-    for _ in range(settings.steps):
+    for _ in range(STEPS):
         at = unit_means(state, case, null.keys, [0])
-        now = robust_squares(residual(null, values, mean_prediction(null, at, 1))[use], heavy)
+        now = robust_squares(residual(null, values, mean_prediction(null, at, 1))[use])
         if now > least:
             damping *= 8.0
         else:
@@ -152,9 +155,9 @@ def fit_candidate(case: MapCase, start: PatternModel, null: Null, values: Floats
             state = _moved(state, f, float(s))
         if np.abs(step).max() < 0.01:
             break
-    predicted = unit_means(best, case, null.keys, range(settings.units))
-    rho = residual(null, values, mean_prediction(null, predicted, settings.units))
-    return MapFit(name, best, sd, predicted, rho, robust_squares(rho[use], heavy))
+    predicted = unit_means(best, case, null.keys, range(units))
+    rho = residual(null, values, mean_prediction(null, predicted, units))
+    return MapFit(name, best, sd, predicted, rho, robust_squares(rho[use]))
 
 
 def fitted_parameters(name: str) -> tuple[str, ...]:
@@ -182,8 +185,7 @@ def _step(
     rho = residual(null, values, mean_prediction(null, predicted, 1))
     gap = np.nan_to_num(values - predicted)
     noise = np.where(np.abs(rho) > 1e-9, np.abs(gap) / np.maximum(np.abs(rho), 1e-9), null.noise)
-    heavy = null.settings.judging.heavy
-    w = np.where(use, (heavy + 1) / (heavy + rho**2) / noise**2, 0.0)
+    w = np.where(use, (HEAVY + 1) / (HEAVY + rho**2) / noise**2, 0.0)
     square = jacobian.T @ (w[:, None] * jacobian) + 1e-9 * np.eye(jacobian.shape[1])
     step = np.linalg.solve(square + damping * np.diag(np.diag(square)), jacobian.T @ (w * gap))
     return np.asarray(step, np.float64), np.asarray(np.linalg.inv(square), np.float64)

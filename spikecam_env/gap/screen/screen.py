@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from spikecam_env.gap.candidates.strength import bounded
 from spikecam_env.gap.candidates.table import candidate
 from spikecam_env.gap.compare.distance import in_noise, loss
-from spikecam_env.gap.compare.prediction import Null, pair_noise_share, pooled
+from spikecam_env.gap.compare.prediction import TOLERANCE, Null, pair_noise_share, pooled
 from spikecam_env.gap.compare.step import scale_of
 from spikecam_env.gap.observe.conditions import Condition
 from spikecam_env.gap.screen.templates import Template, Templates
@@ -90,12 +90,11 @@ def screen(
 def _in_proportion(entry: Template, null: Null, d: Floats, shift: Floats) -> Screened | None:
     """A template scaled to the measured distances `d`, in noise; None where only a wrong sign would do."""
     own2 = pair_noise_share(null.keys) ** 2 * (shift != 0)
-    judging = replace(null.settings.judging, tolerance=2 * null.settings.judging.tolerance)
-    scale, _ = scale_of(d, shift, np.ones_like(d), own2, judging)
+    scale, _ = scale_of(d, shift, np.ones_like(d), own2, 2 * TOLERANCE)
     if scale <= 0 and not candidate(entry.name).may_be_negative:
         return None
     strength, power = CATALOGUE[entry.name].strength, candidate(entry.name).power
-    rho = (d - scale * shift) / np.sqrt(1.0 + scale**2 * own2 + (judging.tolerance * scale * shift) ** 2)
+    rho = (d - scale * shift) / np.sqrt(1.0 + scale**2 * own2 + (2 * TOLERANCE * scale * shift) ** 2)
     there = entry.parameters[strength] * np.sign(scale) * abs(scale) ** (1 / power)
     start = bounded(entry.name, {**entry.parameters, strength: there})
     white = 1.0 / (1.0 + abs(scale) * (1.0 / entry.white - 1.0))

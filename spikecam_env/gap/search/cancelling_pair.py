@@ -13,10 +13,11 @@ from collections.abc import Collection
 
 import numpy as np
 
-from spikecam_env.gap.candidates.strength import bounded, with_effect
+from spikecam_env.gap.candidates.strength import MOST_EXTRAPOLATED, bounded, with_effect
 from spikecam_env.gap.compare.prediction import with_change_scaled
 from spikecam_env.gap.compare.step import scale_to
-from spikecam_env.gap.fit.candidate import Fit
+from spikecam_env.gap.fit.candidate import ROUND_OFF, Fit
+from spikecam_env.gap.fit.gauss_newton import MOST_STEPS
 from spikecam_env.gap.fit.problem import Problem
 from spikecam_env.gap.unit.indirect_inference import extrapolated_unit
 from spikecam_env.gap.unit.refit import constrained_refit
@@ -37,23 +38,22 @@ def fit_pair(problem: Problem, names: Collection[str]) -> Fit | None:
     """
     if not set(PAIR) <= set(names):
         return None
-    frame_rate_hz, settings = problem.case.frame_rate_hz, problem.settings
-    most, round_off = settings.twins.most_extrapolated, settings.fitting.round_off
+    frame_rate_hz = problem.case.frame_rate_hz
     only = problem.affected(PAIR)
     tau_us = START_US
     bare = base = constrained_refit(
         with_both(problem.model, tau_us, frame_rate_hz), constrained_refit(problem.model, problem.case.base)
     )
-    for _ in range(settings.fitting.most_steps):
+    for _ in range(MOST_STEPS):
         there = with_both(problem.model, tau_us, frame_rate_hz)
         predicted = problem.predict(there, base, 1, only)
         base = problem.settled_unit(there, base, predicted)
         square, _ = scale_to(problem.null, problem.seen, predicted)
         if square <= 0:
             return None
-        factor = float(np.clip(np.sqrt(square), 1 / most, most))
-        base, tau_us = extrapolated_unit(bare, base, factor**2, most), tau_us * factor
-        if round_off[0] < factor < round_off[1]:
+        factor = float(np.clip(np.sqrt(square), 1 / MOST_EXTRAPOLATED, MOST_EXTRAPOLATED))
+        base, tau_us = extrapolated_unit(bare, base, factor**2, MOST_EXTRAPOLATED), tau_us * factor
+        if ROUND_OFF[0] < factor < ROUND_OFF[1]:
             break
     predicted = with_change_scaled(problem.null, predicted, factor**2)
     rho, left = problem.residual_and_misfit(predicted)

@@ -12,7 +12,9 @@ from spikecam_env.gap.compare.prediction import Draw
 from spikecam_env.gap.fit.candidate import Fit
 from spikecam_env.gap.fit.problem import Problem
 from spikecam_env.gap.search.rivals import is_rival, lead
-from spikecam_env.gap.settings import PER_PARAMETER
+
+PER_PARAMETER = 2.0
+"""Mean reduction of the deviance by a parameter without a meaning (Akaike)."""
 
 
 def confirmed_in_order(

@@ -24,7 +24,7 @@ from spikecam_env.gap.fit.joint import is_noisy, no_smaller, refined_together, s
 from spikecam_env.gap.fit.last_step import Errors
 from spikecam_env.gap.fit.problem import Problem
 from spikecam_env.gap.screen.templates import Templates
-from spikecam_env.gap.search.choice import chosen_of, confirmed_in_order
+from spikecam_env.gap.search.choice import PER_PARAMETER, chosen_of, confirmed_in_order
 from spikecam_env.gap.search.joint_start import fit_pairs, one_by_one, with_pairs
 from spikecam_env.gap.search.neighbours import (
     may_try_without_earlier,
@@ -46,6 +46,10 @@ from spikecam_env.gap.search.round import (
 )
 from spikecam_env.gap.search.shortlist import fits_of, groups_that_stand_out, screened_beside, starts_to_fit
 from spikecam_env.gap.unit.refit import constrained_refit
+
+JOIN = 2 * PER_PARAMETER
+"""Misfit that a later effect has to remove to earn a joint refit: two parameters without a meaning.  Less than
+`accept`, since earlier effects may have absorbed part of its signature."""
 
 SECOND = "a second effect"
 """Without having looked for it, nothing is named where something is left."""
@@ -77,7 +81,7 @@ def forward_selection(problem: Problem, names: Sequence[str], templates: Templat
         chance = float(np.sum(null.weight * np.isfinite(problem.seen)))
         here = problem.standing_on(now, base, prediction)
         motion_alone = problem.case is not given.case
-        to_join = settings.deviance.join if rounds else settings.deviance.accept
+        to_join = JOIN if rounds else settings.deviance.accept
         turn = Round(now, base, prediction, rho, here.misfit(), motion_alone=motion_alone, to_join=to_join)
         turn = with_candidates(problem, here, names, templates, turn)
         rounds.append(turn)
@@ -164,7 +168,7 @@ def is_stand_in(problem: Problem, last: Round, best: Fit, chance: float, later: 
     """Whether the first effect, or a second bend, removes little and leaves something: it may stand for another."""
     if later and not is_second_bend(last, best):
         return False
-    little = is_small_share(last, best.misfit, chance, later, problem.settings.searching)
+    little = is_small_share(last, best.misfit, chance, later)
     return little and is_significant(problem.null, best.rho, best.prediction)
 
 

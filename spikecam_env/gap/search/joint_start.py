@@ -18,13 +18,16 @@ from spikecam_env.gap.candidates.strength import bounded, with_effect
 from spikecam_env.gap.candidates.table import LACKING, candidate
 from spikecam_env.gap.compare.prediction import Prediction, with_change_scaled
 from spikecam_env.gap.compare.step import scale_to
-from spikecam_env.gap.fit.candidate import Fit
-from spikecam_env.gap.fit.gauss_newton import descend
+from spikecam_env.gap.fit.candidate import LARGEST_FACTOR, Fit
+from spikecam_env.gap.fit.gauss_newton import COMPARED, descend
 from spikecam_env.gap.fit.problem import Problem
 from spikecam_env.gap.fit.shapes import where_ended
 from spikecam_env.gap.search.round import Round
 from spikecam_env.gap.unit.refit import BaseFit, constrained_refit
 from spikecam_env.sensor import CATALOGUE, SensorModel
+
+DESCENTS = 2
+"""Starts of two effects that start jointly, from which both are fitted."""
 
 
 @dataclass(frozen=True)
@@ -59,8 +62,7 @@ def _fit_pair(here: Problem, pair: Pair) -> Fit | None:
     grid = [dict(zip(starts, values, strict=True)) for values in product(*starts.values())]
     only = here.affected(pair.names)
     free = [(name, key) for name in pair.names for key in candidate(name).fitted]
-    descents, most = here.settings.searching.descents, here.settings.fitting.largest_factor
-    cost = len(only) * (len(grid) + descents * (1 + len(free)))
+    cost = len(only) * (len(grid) + DESCENTS * (1 + len(free)))
     if not here.allows(f"{pair.first} with {pair.second}", cost, needed=True):
         return None
     fitted = candidate(pair.first).fitted
@@ -72,7 +74,7 @@ def _fit_pair(here: Problem, pair: Pair) -> Fit | None:
         tried = with_effect(model, pair.first, first)
         predicted = here.predict(tried, constrained_refit(tried, here.case.base), 1, only)
         scale, _ = scale_to(here.null, here.seen, predicted)
-        scale = float(np.sign(scale) * np.clip(abs(scale), 1 / most, most))
+        scale = float(np.sign(scale) * np.clip(abs(scale), 1 / LARGEST_FACTOR, LARGEST_FACTOR))
         scaled = bounded(pair.first, {**first, strength: first[strength] * scale})
         predicted, there = with_change_scaled(here.null, predicted, scale), with_effect(model, pair.first, scaled)
         rho, left = here.residual_and_misfit(predicted)
@@ -83,11 +85,11 @@ def _fit_pair(here: Problem, pair: Pair) -> Fit | None:
         return here.predict(there, constrained_refit(there, base), 1, only)
 
     def descended(found: Fit) -> Fit:
-        end = descend(here, probe, found.model, found.base, free, here.settings.deviance.compare)
+        end = descend(here, probe, found.model, found.base, free, COMPARED)
         return where_ended(here, found, end, free)
 
     with ThreadPoolExecutor(here.case.jobs) as pool:
-        best = sorted(pool.map(start, grid), key=lambda f: f.misfit)[:descents]
+        best = sorted(pool.map(start, grid), key=lambda f: f.misfit)[:DESCENTS]
         fits = list(pool.map(descended, best))
     return min(fits, key=lambda f: f.misfit)
 

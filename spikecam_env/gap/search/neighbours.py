@@ -26,11 +26,11 @@ from spikecam_env.gap.fit.confirm import confirmed, no_more_certain, resettled, 
 from spikecam_env.gap.fit.joint import refined_together
 from spikecam_env.gap.fit.last_step import Errors
 from spikecam_env.gap.fit.problem import Problem
-from spikecam_env.gap.fit.shapes import with_fitted_shapes
+from spikecam_env.gap.fit.shapes import WORTH, with_fitted_shapes
 from spikecam_env.gap.screen.screen import Screened
 from spikecam_env.gap.search.cancelling_pair import PAIR, fit_pair
 from spikecam_env.gap.search.choice import chosen_of, confirmed_in_order
-from spikecam_env.gap.search.round import Round
+from spikecam_env.gap.search.round import SAME_SHARE, Round
 from spikecam_env.gap.search.shortlist import fit_from, may_be_shaped, recordings_of
 from spikecam_env.types import Floats
 
@@ -52,15 +52,14 @@ def try_other_starts(
         The shaped fit, if one of the starts removes nearly as much as `found` does; else nothing.
     """
     began = min((s for s in tries if s.name == found.name), key=lambda s: tries[s].misfit)
-    searching = problem.settings.searching
-    starts = other_starts(began, screened, before, searching.worth)
+    starts = other_starts(began, screened, before, WORTH)
     cost = recordings_of(problem, found) * sum(s not in tries for s in starts)
     if not starts or not problem.allows(f"{found.name} of another shape", cost):
         return []
     with ThreadPoolExecutor(problem.case.jobs) as pool:
         new = [s for s in starts if s not in tries]
         fits = {**tries, **dict(zip(new, pool.map(partial(fit_from, problem), new), strict=True))}
-    near = [fits[s] for s in starts if before - fits[s].misfit > searching.same_share * (before - found.misfit)]
+    near = [fits[s] for s in starts if before - fits[s].misfit > SAME_SHARE * (before - found.misfit)]
     best = [f for f in sorted(near, key=lambda f: f.misfit)[:1] if may_be_shaped(problem, f)]
     return [with_fitted_shapes(problem, f) for f in best]
 
@@ -91,7 +90,7 @@ def try_in_place_of_earlier(problem: Problem, best: Fit, turn: Round) -> tuple[F
         (the fit of all effects, the earlier round), with the effect that is better now.
     """
     first, searching = turn.fits[0], problem.settings.searching
-    least = turn.misfit - searching.worth * (turn.misfit - first.misfit)
+    least = turn.misfit - WORTH * (turn.misfit - first.misfit)
     has = {e.name for e in best.model.effects}
     others = sorted((f for f in turn.fits if f.name not in has and f.misfit < least), key=lambda f: f.misfit)
     others = others[: searching.earlier_tried]
@@ -125,7 +124,7 @@ def try_in_place_of_last(problem: Problem, last: Round, errors: Errors, names: S
     Returns:
         (round, errors): with the runner-up if it leaves less misfit by more than a tie, else as given.
     """
-    for other in runner_up(last, names, problem.settings.searching.same_share):
+    for other in runner_up(last, names, SAME_SHARE):
         if not problem.allows(f"alternatives to {names[-1]}"):
             continue
         tried, known, used_held_out = refined_together(problem, other, [*names[:-1], other.name])

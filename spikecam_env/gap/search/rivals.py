@@ -12,7 +12,7 @@ from dataclasses import replace
 import numpy as np
 import scipy
 
-from spikecam_env.gap.compare.distance import residual_and_misfit
+from spikecam_env.gap.compare.distance import APART, residual_and_misfit
 from spikecam_env.gap.compare.prediction import Draw, Null, Prediction, own_variance, with_change_scaled
 from spikecam_env.gap.compare.step import scale_to
 from spikecam_env.types import Floats
@@ -56,7 +56,7 @@ def most_likely(null: Null, best: Prediction, other: Prediction) -> tuple[Floats
     """
     apart, own2, others2 = best.mean - other.mean, own_variance(null, other), own_variance(null, best)
     both2 = np.maximum(own2 + others2, 1e-300)
-    clearly = np.abs(apart) > null.settings.judging.apart * np.sqrt(both2)
+    clearly = np.abs(apart) > APART * np.sqrt(both2)
     share = np.where(clearly, 0.0, own2 / both2)
     return other.mean + share * apart, (1.0 - share) * own2
 

@@ -10,11 +10,22 @@ from spikecam_env.gap.candidates.table import candidate, expected_events
 from spikecam_env.gap.compare.distance import is_significant
 from spikecam_env.gap.compare.prediction import Null, Prediction
 from spikecam_env.gap.fit.candidate import Fit
-from spikecam_env.gap.settings import Deviance, Searching
+from spikecam_env.gap.fit.shapes import WORTH
+from spikecam_env.gap.settings import Deviance
 from spikecam_env.gap.twins.case import Case
 from spikecam_env.gap.unit.refit import BaseFit
 from spikecam_env.sensor import SensorModel
 from spikecam_env.types import Floats
+
+SAME_SHARE = 0.8
+"""Of what the best removes, nearly all: a runner-up, or another start, that removes more is tried in its place.  A
+first effect that removes less than the rest, and leaves something, is not refined before another is found."""
+
+LEAST_EVENTS = 0.5
+"""Pixels, spikes or frames: an effect that changes fewer is not there, as they round to none."""
+
+LEAST_CHANGE = 2.0
+"""Noises: an effect that changes no statistic by more is not added, as twins of nothing differ by luck."""
 
 
 @dataclass(frozen=True)
@@ -59,7 +70,7 @@ def is_visible(here: Null, found: Fit) -> bool:
     Scatter counts since a few hot pixels are in some units only.  An effect of random course is always visible."""
     there = found.prediction
     change = np.hypot(there.mean - here.mean, np.sqrt(np.maximum(there.spread**2 - here.sd**2, 0.0))) / here.noise
-    return candidate(found.name).random_course or bool(change.max() > here.settings.searching.least_change)
+    return candidate(found.name).random_course or bool(change.max() > LEAST_CHANGE)
 
 
 def absent(case: Case, given: SensorModel, model: SensorModel) -> set[str]:
@@ -70,7 +81,7 @@ def absent(case: Case, given: SensorModel, model: SensorModel) -> set[str]:
         name
         for name, parameters in there.items()
         if parameters[candidate(name).strength] == 0
-        or expected_events(name, parameters, case.conditions, case.observations) < case.settings.searching.least_events
+        or expected_events(name, parameters, case.conditions, case.observations) < LEAST_EVENTS
     }
 
 
@@ -90,9 +101,9 @@ def is_improvement(null: Null, before: float, best: Fit, later: bool, weak: bool
     return before - best.misfit >= (0.0 if explained else null.settings.deviance.accept)
 
 
-def is_small_share(turn: Round, left: float, chance: float, later: bool, searching: Searching) -> bool:
+def is_small_share(turn: Round, left: float, chance: float, later: bool) -> bool:
     """Whether a misfit `left` is little less than what a round started from: a stand-in's.
 
     chance: misfit of noise alone.  later: whether effects were found before."""
-    least = searching.worth if later else searching.least_share
+    least = WORTH if later else 1 - SAME_SHARE
     return turn.misfit - left < least * (turn.misfit - chance)

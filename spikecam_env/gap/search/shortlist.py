@@ -9,11 +9,12 @@ from functools import partial
 import numpy as np
 
 from spikecam_env.gap.candidates.table import acting_through, candidate
+from spikecam_env.gap.compare.distance import SHOWS
 from spikecam_env.gap.compare.prediction import Null
 from spikecam_env.gap.fit.candidate import Fit, fit
 from spikecam_env.gap.fit.problem import Problem
 from spikecam_env.gap.fit.recordings import twins_of
-from spikecam_env.gap.fit.shapes import with_fitted_shapes, with_shapes_to_fit
+from spikecam_env.gap.fit.shapes import WORTH, with_fitted_shapes, with_shapes_to_fit
 from spikecam_env.gap.fit.simulated_templates import own_templates
 from spikecam_env.gap.screen.screen import Screened, screen
 from spikecam_env.gap.screen.templates import Templates
@@ -22,14 +23,23 @@ from spikecam_env.gap.statistics.spectrum import frequency, spectrum, strongest_
 from spikecam_env.gap.twins.case import Case
 from spikecam_env.types import Floats
 
+LEAST_SPIKES = 1000
+"""Spikes of a recording whose spectrum says something."""
+
+LINE = 30.0
+"""Times the usual power, of a line from whose frequency periodic candidates start."""
+
+FEWEST_FITTED = 3
+"""Candidates that are fitted in a round at least, the best by their templates."""
+
 
 def line_of(case: Case) -> float | None:
     """Frequency [Hz] of the strongest line in steady light; None where no line stands out."""
-    both, searching = zip(case.conditions, case.observations, strict=True), case.settings.searching
+    both = zip(case.conditions, case.observations, strict=True)
     steady = [o.frame for c, o in both if not c.moves and c.use == "fit"]
-    lines = [(strongest_line(spectrum(frame))[::-1], frame) for frame in steady if frame.sum() > searching.least_spikes]
+    lines = [(strongest_line(spectrum(frame))[::-1], frame) for frame in steady if frame.sum() > LEAST_SPIKES]
     (ratio, at), frame = max(lines, key=lambda line: line[0][0], default=((0.0, 0), np.zeros(1)))
-    return frequency(frame, at) * case.frame_rate_hz if ratio > searching.line else None
+    return frequency(frame, at) * case.frame_rate_hz if ratio > LINE else None
 
 
 def screened_beside(here: Problem, names: Sequence[str], templates: Templates) -> list[Screened]:
@@ -54,7 +64,7 @@ def starts_to_fit(
 ) -> list[Screened]:
     """Which candidates to fit, and from where: the best by their templates.
 
-    Those are `fewest_fitted`, and up to `most_fitted` if they explain enough of what the best explains.  A candidate
+    Those are `FEWEST_FITTED`, and up to `most_fitted` if they explain enough of what the best explains.  A candidate
     that takes several twins a try has to explain enough in any case.
 
     Args:
@@ -68,10 +78,10 @@ def starts_to_fit(
     screened = best_of_each(shapes)
     if not screened:
         return []
-    enough = before - searching.worth * (before - screened[0].misfit)
+    enough = before - WORTH * (before - screened[0].misfit)
     once = [s for s in screened if s.misfit < enough or not takes_several_twins(s.name)]
     best = once[: searching.most_fitted]
-    tried = [s for i, s in enumerate(best) if i < searching.fewest_fitted or s.misfit < enough]
+    tried = [s for i, s in enumerate(best) if i < FEWEST_FITTED or s.misfit < enough]
     also = [s for s in screened if candidate(s.name).is_pattern] if "pattern" in groups else []
     if {"moving", "step"} & set(groups):
         also += [s for s in shapes if candidate(s.name).of_motion]
@@ -85,7 +95,7 @@ def takes_several_twins(name: str) -> bool:
 
 def groups_that_stand_out(null: Null, distance: Floats) -> set[str]:
     """Groups of which a statistic stands out by itself, or is what stands out most.  distance: (S,) in noise."""
-    least = min(null.settings.judging.shows, float(np.abs(distance).max()))
+    least = min(SHOWS, float(np.abs(distance).max()))
     return {k.group for k, d in zip(null.keys, distance, strict=True) if abs(d) >= least}
 
 
@@ -115,4 +125,4 @@ def may_be_shaped(problem: Problem, found: Fit) -> bool:
 def recordings_of(problem: Problem, found: Fit) -> int:
     """Recordings that one prediction of a candidate simulates."""
     only = problem.affected([found.name], found.prediction.mean - problem.null.mean)
-    return len(only) * twins_of(found.name, problem.settings.twins)
+    return len(only) * twins_of(found.name)

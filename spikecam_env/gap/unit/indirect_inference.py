@@ -17,14 +17,18 @@ from spikecam_env.gap.unit.refit import BaseFit, constrained_refit
 from spikecam_env.sensor import SensorModel
 from spikecam_env.types import Floats
 
+IDENTIFIABLE = 0.5
+"""Share of the refit's s^2 that is the unit's own, below which s^2 stays: beside so much noise of an effect the refits
+of twins do not identify it (`fit.joint` does, by all statistics)."""
 
-def inferred_unit(
-    model: SensorModel, used: BaseFit, wanted: BaseFit, simulated: Sequence[BaseFit], identifiable: float
-) -> BaseFit:
+CONVERGED = 3e-4
+"""Largest change of a unit's median gain, relative, up to which it is not simulated again: a thirtieth of the
+rate that four kicks of 0.0025 add, the crosstalk of `tests/gap/fit/test_candidate.py`.  A unit so much brighter has
+other statistics where pixels saturate."""
+
+
+def inferred_unit(model: SensorModel, used: BaseFit, wanted: BaseFit, simulated: Sequence[BaseFit]) -> BaseFit:
     """A step of indirect inference: the unit `used`, shifted by `wanted` less its twins' refits, `simulated`.
-
-    identifiable: share of the refit's s^2 that is the unit's own, below which s^2 stays: beside so much noise of an
-    effect the refits of twins do not identify it (`fit.joint` does, by all statistics).
 
     The shift of a pixel is a smooth function of its own response and dark level: pixel by pixel it would be fitted to
     the noise of these very twins.  Where most pixels of the twins are silent under a strong effect, the unit stays.
@@ -36,16 +40,13 @@ def inferred_unit(
     gain = used.gain * np.exp(_surface(used, live, ratio))
     dark = used.dark + _surface(used, live, wanted.dark[live] - np.mean([s.dark[live] for s in simulated], axis=0))
     white = used.white + wanted.white - float(np.mean([s.white for s in simulated]))
-    white = used.white if used.white < identifiable * wanted.white else max(white, 0.1 * used.white)
+    white = used.white if used.white < IDENTIFIABLE * wanted.white else max(white, 0.1 * used.white)
     return constrained_refit(model, replace(used, gain=gain, dark=np.maximum(dark, 0.0), white=white))
 
 
-def has_converged(one: BaseFit, other: BaseFit, converged: float) -> bool:
-    """Whether the change between two units is so small that twins of one serve for the other.
-
-    converged: largest such change of the median gain.  Beyond it, a unit so much brighter has other statistics where
-    pixels saturate."""
-    return gain_change(one, other) <= converged
+def has_converged(one: BaseFit, other: BaseFit) -> bool:
+    """Whether the change between two units is so small that twins of one serve for the other (`CONVERGED`)."""
+    return gain_change(one, other) <= CONVERGED
 
 
 def gain_change(one: BaseFit, other: BaseFit) -> float:

@@ -16,7 +16,9 @@ import numpy as np
 from spikecam_env.gap.baseline.null_model import unit_under
 from spikecam_env.gap.candidates.strength import bounded
 from spikecam_env.gap.candidates.table import candidate
+from spikecam_env.gap.compare.distance import SHOWS
 from spikecam_env.gap.compare.prediction import Null
+from spikecam_env.gap.fit.candidate import MOST_TRIES
 from spikecam_env.gap.result import Bound
 from spikecam_env.gap.screen.templates import Templates
 from spikecam_env.gap.twins.case import Case
@@ -31,6 +33,12 @@ from spikecam_env.gap.verdict.score import (
 )
 from spikecam_env.sensor import CATALOGUE, SensorModel
 from spikecam_env.types import Floats
+
+MOST_EFFECT_SIZE = 25.0
+"""Noises by which an effect shows at most for its score: what it changes there is like what it changes at its bound."""
+
+OVERSHOOT = 1.2
+"""The first strength that is tested, over what is expected."""
 
 LARGEST_SCALING = 40.0
 """Factor by which statistics are made larger or smaller at once, on the way to a score."""
@@ -100,8 +108,7 @@ class ScoredShape:
     @property
     def expected(self) -> float:
         """Strength at which the bound is expected, infinite where the effect does not show."""
-        settings = self.probe.settings
-        if self.score is None or self.score.effect_size < 0.5 * settings.judging.shows:
+        if self.score is None or self.score.effect_size < 0.5 * SHOWS:
             return np.inf
         beyond = self.excess + self.score.likely_sds * self.score.sd
         factor = (beyond / self.score.rise) ** (1 / power_of(self.probe.name))
@@ -110,16 +117,16 @@ class ScoredShape:
 
 def scored_shape(probe: TwinProbe | UnitProbe, measured: Floats, start: Parameters) -> ScoredShape:
     """A candidate at a strength where it shows well, from a start."""
-    name, score, settings = probe.name, None, probe.settings
-    least, most, power = settings.judging.shows, settings.bounding.most_effect_size, power_of(name)
+    name, score = probe.name, None
+    power = power_of(name)
     parameters = bounded(name, start)
-    for _ in range(settings.fitting.most_tries):
+    for _ in range(MOST_TRIES):
         score = probe.score(parameters) or score
         effect_size = score.effect_size if score else 0.0
-        larger = np.clip(2 * least / max(effect_size, 1e-9), 1 / LARGEST_SCALING, LARGEST_SCALING)
+        larger = np.clip(2 * SHOWS / max(effect_size, 1e-9), 1 / LARGEST_SCALING, LARGEST_SCALING)
         factor = float(larger) ** (1 / power)
         stronger = bounded(name, {**parameters, strength_of(name): parameters[strength_of(name)] * factor})
-        if least <= effect_size <= most or stronger == parameters:
+        if SHOWS <= effect_size <= MOST_EFFECT_SIZE or stronger == parameters:
             break
         parameters = stronger
     return ScoredShape(probe, score, excess_of(score, measured))
@@ -133,15 +140,14 @@ def excess_of(score: Score | None, measured: Floats) -> float:
 def bound_of(measured: Floats, shape: ScoredShape) -> Bound | tuple[str, str]:
     """The least refuted strength above which no tested strength is open; without one the name, with what is needed."""
     probe, name, key = shape.probe, shape.probe.name, strength_of(shape.probe.name)
-    settings = probe.settings
-    resolution, overshoot = settings.bounding.resolution, settings.bounding.overshoot
+    resolution = probe.settings.bounding.resolution
     if shape.score is None or not np.isfinite(shape.expected) or probe.events(shape.score.parameters) <= 0:
         return name, LONGER_RECORDINGS
     score = probe.refined(shape.score)
     excess = excess_of(score, measured)
     at = first_strength(shape)
     least, most_open = np.inf, 0.0
-    for _ in range(settings.fitting.most_tries):
+    for _ in range(MOST_TRIES):
         size, test = abs(at[key]), probe.test(score, at)
         wanted = excess + test.quantile * test.sd
         ratio = float(np.clip(wanted / max(test.excess, 0.1 * wanted), 0.1, 10.0)) ** (1 / power_of(name))
@@ -151,9 +157,9 @@ def bound_of(measured: Floats, shape: ScoredShape) -> Bound | tuple[str, str]:
                 break
         else:
             most_open = size
-            ratio = max(ratio, overshoot)
+            ratio = max(ratio, OVERSHOOT)
         bracketed = most_open and np.isfinite(least)
-        following = float(np.sqrt(most_open * least)) if bracketed else overshoot * ratio * size
+        following = float(np.sqrt(most_open * least)) if bracketed else OVERSHOOT * ratio * size
         following_at = bounded(name, {**at, key: np.sign(at[key]) * following})
         if following_at == at:
             break
@@ -170,7 +176,7 @@ def first_strength(shape: ScoredShape) -> Parameters:
     Counted things are expected at least twice RULE_OF_THREE times there, if their number grows with the strength."""
     assert shape.score is not None
     name, key, at = shape.probe.name, strength_of(shape.probe.name), dict(shape.score.parameters)
-    at[key] *= shape.probe.settings.bounding.overshoot * shape.expected / abs(at[key])
+    at[key] *= OVERSHOOT * shape.expected / abs(at[key])
     share = candidate(name).share
     if share and share[0] == key:
         at[key] *= max(2 * RULE_OF_THREE / shape.probe.events(at), 1.0)

@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 from spikecam_env.gap.baseline.motion import DetectedMotion
-from spikecam_env.gap.baseline.static_part import static_pixels
+from spikecam_env.gap.baseline.static_part import ENOUGH_STATIC, static_pixels
 from spikecam_env.gap.result import Conclusion
-from spikecam_env.gap.settings import DiagnosisSettings
 from spikecam_env.sensor import SensorModel
 
 TO_DO = (
@@ -16,9 +15,7 @@ TO_DO = (
 TO_DO_IN_KNOWN_LIGHT = "In known light, give the light over time (an .npz) as the label, or leave the recording out."
 
 
-def moves(
-    model: SensorModel, motion: tuple[DetectedMotion, ...], settings: DiagnosisSettings, *, static_only: bool
-) -> Conclusion:
+def moves(model: SensorModel, motion: tuple[DetectedMotion, ...], *, static_only: bool) -> Conclusion:
     """The verdict `data`: nothing was compared."""
     return Conclusion(
         verdict="data",
@@ -26,7 +23,7 @@ def moves(
         unknown=None,
         class_=None,
         parameters={},
-        notes=(*(m.text for m in motion), *what_to_do(motion, static_only, settings.concluding.large_share)),
+        notes=(*(m.text for m in motion), *what_to_do(motion, static_only)),
         gap=None,
         statistics=(),
         ranking=(),
@@ -35,14 +32,14 @@ def moves(
     )
 
 
-def what_to_do(motion: tuple[DetectedMotion, ...], static_only: bool, least: float) -> list[str]:
-    """Steps that make the campaign usable.  least: share of pixels that has to be static."""
+def what_to_do(motion: tuple[DetectedMotion, ...], static_only: bool) -> list[str]:
+    """Steps that make the campaign usable."""
     share = float(static_pixels(motion).mean())
     advice = [TO_DO] if any(not m.light_known for m in motion) else []
     if any(m.light_known for m in motion):
         advice.append(TO_DO_IN_KNOWN_LIGHT)
-    if static_only and share < least:
-        advice.insert(0, f"{100 * share:.3g} % of pixels are static; --static-only needs {100 * least:g} %.")
+    if static_only and share < ENOUGH_STATIC:
+        advice.insert(0, f"{100 * share:.3g} % of pixels are static; --static-only needs {100 * ENOUGH_STATIC:g} %.")
     return advice
 
 

@@ -16,14 +16,14 @@ from functools import partial
 import numpy as np
 import scipy
 
-from spikecam_env.gap.candidates.strength import with_effect
+from spikecam_env.gap.candidates.strength import MOST_EXTRAPOLATED, with_effect
 from spikecam_env.gap.candidates.table import candidate, expected_events
-from spikecam_env.gap.compare.distance import in_noise
+from spikecam_env.gap.compare.distance import CLEAR, in_noise
 from spikecam_env.gap.compare.prediction import Null, Prediction, pair_noise_share, pooled
 from spikecam_env.gap.compare.step import is_clear
 from spikecam_env.gap.fit.gauss_newton import at_settled_unit
 from spikecam_env.gap.fit.predict import predict_by_twins, with_drawn_pattern
-from spikecam_env.gap.fit.recordings import recordings_affected, twins_of
+from spikecam_env.gap.fit.recordings import OF_RANDOM_COURSE, recordings_affected, twins_of
 from spikecam_env.gap.twins.case import Case
 from spikecam_env.gap.unit.indirect_inference import extrapolated_unit
 from spikecam_env.gap.unit.refit import BaseFit, constrained_refit
@@ -128,7 +128,7 @@ class TwinProbe(EffectProbe):
 
     def score(self, parameters: Parameters, count: int = 1) -> Score | None:
         """The score by the statistics that the effect clearly changes at some strength; None where it changes none."""
-        count = self.settings.twins.of_random_course if self.random_course else count
+        count = OF_RANDOM_COURSE if self.random_course else count
         count = min(count, len(self.null.draws) // 2)
         strong = with_effect(self.model, self.name, parameters)
         bare = constrained_refit(strong, constrained_refit(self.model, self.case.base))
@@ -144,13 +144,13 @@ class TwinProbe(EffectProbe):
         """The score of single events by more campaigns: of few, which statistics they change is chance."""
         if not candidate(self.name).share:
             return score
-        return self.score(score.parameters, twins_of(self.name, self.settings.twins)) or score
+        return self.score(score.parameters, twins_of(self.name)) or score
 
     def _change_score(self, made: Prediction, parameters: Parameters) -> Score | None:
         null, count = self.null, len(made.draws)
         change = np.where(self.usable, np.nan_to_num(made.mean - null.mean), 0.0)
         own2 = (pair_noise_share(null.keys) * null.noise) ** 2 / count
-        change = np.where(is_clear(change, np.maximum(own2, 1e-300), null.settings.judging), change, 0.0)
+        change = np.where(is_clear(change, np.maximum(own2, 1e-300)), change, 0.0)
         without = {d.number: d.values for d in null.draws}
         each = np.nan_to_num([d.values - without[d.number] for d in made.draws])
         scatter = each.std(axis=0, ddof=1) if count > 1 else 0.0
@@ -173,10 +173,9 @@ class TwinProbe(EffectProbe):
         assert score.bare is not None and score.unit is not None
         key, events = strength_of(self.name), self.events(parameters)
         times = abs(parameters[key] / score.parameters[key]) ** power_of(self.name)
-        twins = self.settings.twins
-        count = min(twins.of_random_course if self.random_course else twins.in_the_end, len(score.without))
+        count = min(OF_RANDOM_COURSE if self.random_course else self.settings.twins.in_the_end, len(score.without))
         null = replace(self.null, draws=self.null.draws[:count])
-        unit = extrapolated_unit(score.bare, score.unit, min(times, 1.0), twins.most_extrapolated)
+        unit = extrapolated_unit(score.bare, score.unit, min(times, 1.0), MOST_EXTRAPOLATED)
         made = predict_by_twins(self.case, with_effect(self.model, self.name, parameters), unit, null, count, self.only)
         scores, without = (np.array([score.of(d.values) for d in draws]) for draws in (made.draws, null.draws))
         if self.random_course:
@@ -234,7 +233,7 @@ def linear(
     scatter: (S,) by which that differs from campaign to campaign: what few events change by much is known poorly.
     Statistics of unknown noise, as those of a pattern in the dark without a spike, count for nothing.
     """
-    most = null.settings.judging.clear  # one false spike in a quiet pixel is a hundred noises
+    most = CLEAR  # one false spike in a quiet pixel is a hundred noises
     deviates = np.clip(np.nan_to_num(change / null.noise), -most, most)
     weight = null.weight * deviates / (1.0 + np.minimum(np.nan_to_num(scatter / null.noise), most) ** 2)
     if not weight.any():
@@ -246,7 +245,7 @@ def linear(
 
 def linear_score(null: Null, weight: Floats, values: Floats) -> float:
     """Score of statistics (S,) along a change; what is unknown counts for nothing."""
-    most = null.settings.judging.clear
+    most = CLEAR
     return float(weight @ np.clip(in_noise(null, values), -most, most))
 
 

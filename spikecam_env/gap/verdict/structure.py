@@ -6,10 +6,14 @@ from typing import Any
 
 import numpy as np
 
+from spikecam_env.gap.compare.distance import CLEAR, HEAVY
 from spikecam_env.gap.compare.prediction import Null
 from spikecam_env.gap.twins.case import Case
 from spikecam_env.gap.verdict.where_and_when import when, where
 from spikecam_env.types import Floats
+
+COMMON_SHARE = 0.3
+"""Of all that is off, what statistics of many pixels have where a difference is common to them."""
 
 LEAST_LEVELS = 3
 """Flats on which a statistic has to be clearly off for its power of the level."""
@@ -25,11 +29,10 @@ def structure(case: Case, null: Null, off: Floats) -> dict[str, Any]:
     """
     kind = {c.name: c.kind for c in case.conditions}
     level = {c.name: c.level for c in case.conditions}
-    clear, large_share = null.settings.judging.clear, null.settings.concluding.large_share
-    seen = np.abs(off) > clear
+    seen = np.abs(off) > CLEAR
     weight = {g: 0.0 for g in dict.fromkeys(k.group for k in null.keys)}
     for k, o in zip(null.keys, off, strict=True):
-        weight[k.group] += float(np.log1p(o**2 / null.settings.judging.heavy))
+        weight[k.group] += float(np.log1p(o**2 / HEAVY))
     order = sorted(weight, key=lambda g: -weight[g])
     keys = [k for k, s in zip(null.keys, seen, strict=True) if s]
     dark = any(kind[k.recording] == "dark" and k.group != "rates" for k in keys)
@@ -39,7 +42,7 @@ def structure(case: Case, null: Null, off: Floats) -> dict[str, Any]:
     return {
         "light": "in the dark and in the light" if dark and lit else "in the dark" if dark else "in the light",
         "level_exponent": level_exponent(null, off, kind, level),
-        "extent": "common to many pixels" if common > large_share * total else "pixel by pixel",
+        "extent": "common to many pixels" if common > COMMON_SHARE * total else "pixel by pixel",
         "time_scale_s": None,
         "history": any(k.group in _MEMORY and k.name not in ("level", "square", "row", "column") for k in keys),
         "neighbours": any(k.group == "neighbours" for k in keys),
@@ -55,12 +58,11 @@ def level_exponent(null: Null, off: Floats, kind: dict[str, str], level: dict[st
     """Slope of log |statistic| on log level over the flats, of the statistic that is seen on most of them, the
     first of several."""
     best: tuple[float, float] | None = None
-    clear = null.settings.judging.clear
     for group, name in dict.fromkeys((k.group, k.name) for k in null.keys):
         points = [
             (level[k.recording], abs(o) * n)
             for k, o, n in zip(null.keys, off, null.noise, strict=True)
-            if (k.group, k.name) == (group, name) and kind[k.recording] == "flat" and abs(o) > clear
+            if (k.group, k.name) == (group, name) and kind[k.recording] == "flat" and abs(o) > CLEAR
         ]
         if len(points) < LEAST_LEVELS:
             continue

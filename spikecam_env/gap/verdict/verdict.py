@@ -17,6 +17,7 @@ from spikecam_env.gap.compare.prediction import Null
 from spikecam_env.gap.fit.candidate import Fit
 from spikecam_env.gap.fit.confirm import confirmed
 from spikecam_env.gap.fit.problem import Problem
+from spikecam_env.gap.fit.shapes import WORTH
 from spikecam_env.gap.result import Conclusion, NamedEffect, Remainder, Statistic
 from spikecam_env.gap.search.forward import SECOND
 from spikecam_env.gap.search.round import Round
@@ -155,7 +156,7 @@ def with_stand_ins(case: Case, null: Null, values: Floats, rounds: Sequence[Roun
     *before, last = rounds
     explaining = [r for r in rounds[1:] if explains(null, values, r.prediction)]
     if explaining:
-        end, little = explaining[0], 1.0 - null.settings.searching.worth
+        end, little = explaining[0], 1.0 - WORTH
         for later in explaining[1:]:
             if squares_left(null, values, later.prediction) <= little * squares_left(null, values, end.prediction):
                 end = later
@@ -183,7 +184,7 @@ def with_given_parameters(problem: Problem, tested: SensorModel, rounds: Sequenc
     own = Fit("", {}, {}, last.prediction, off.nominal, last.rho, last.misfit, last.model)
     given = confirmed(problem, own, count)
     left = squares_left(null, values, given.prediction)
-    most = squares_left(null, values, last.prediction) <= (1.0 - problem.settings.searching.worth) * left
+    most = squares_left(null, values, last.prediction) <= (1.0 - WORTH) * left
     if not explains(null, values, given.prediction) or (left > 0.0 and most):
         return list(rounds)
     end = replace(last, base=given.base, prediction=given.prediction, rho=given.rho, misfit=given.misfit)

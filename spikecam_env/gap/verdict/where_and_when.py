@@ -9,12 +9,27 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from spikecam_env.gap.baseline.halves_floor import LEAST_FRAMES
+from spikecam_env.gap.compare.distance import CLEAR
 from spikecam_env.gap.observe.conditions import LABEL_ERROR
 from spikecam_env.gap.observe.observation import TIME_BLOCKS
-from spikecam_env.gap.settings import Concluding, DiagnosisSettings
+from spikecam_env.gap.search.shortlist import LEAST_SPIKES, LINE
 from spikecam_env.gap.statistics.spectrum import spectrum, strongest_line
 from spikecam_env.gap.twins.case import Case
 from spikecam_env.types import Floats
+
+LOCAL_NOISES = 8.0
+"""Noises by which a field, or a half, stands out where, or when, an effect acts.  Comparisons are many; in the clean
+campaigns of `tests/gap/verdict` none does."""
+
+TIMES_EXPECTED = 2.0
+"""Times expected, irregular intervals of a field in which an effect acts."""
+
+HALF_SHARE = 0.3
+"""Of all, the irregular intervals that halves differ by where they are of one half."""
+
+LINE_RATIO = 6.0
+"""Power of a line in one half over that in the other."""
 
 FIELDS_PER_SIDE = 3
 """Fields along each side of the array."""
@@ -29,8 +44,8 @@ def where(case: Case) -> str:
             irregular += o.short + o.long
     known = np.isfinite(case.base.residual)
     off = np.where(known, case.base.residual, 0.0)[brightest_flats(case)].mean(axis=0) if len(known) else off
-    fields, limits = fields_of(case.shape), case.settings.concluding
-    out = outlying_counts(irregular, fields, limits) | outlying_means(off, fields, case.settings)
+    fields = fields_of(case.shape)
+    out = outlying_counts(irregular, fields) | outlying_means(off, fields)
     if not 0 < out.sum() <= FIELDS_PER_SIDE:
         return ""
     names = [rows_and_columns(int(f), case.shape) for f in np.flatnonzero(out)]
@@ -52,17 +67,17 @@ def fields_of(shape: tuple[int, int]) -> NDArray[np.int64]:
     return both
 
 
-def outlying_counts(irregular: Floats, fields: NDArray[np.int64], limits: Concluding) -> NDArray[np.bool_]:
+def outlying_counts(irregular: Floats, fields: NDArray[np.int64]) -> NDArray[np.bool_]:
     """(9,) fields with more irregular intervals, (P,) of each pixel, than the median field lets expect."""
     count = np.bincount(fields, irregular, FIELDS_PER_SIDE**2)
     share = np.bincount(fields, minlength=FIELDS_PER_SIDE**2) / fields.size
     usual = float(np.median(count / share))
     expected = np.maximum(usual * share, 1.0)
-    more = count - expected > limits.local_noises * np.sqrt(expected)
-    return (count > limits.times_expected * expected) & more
+    more = count - expected > LOCAL_NOISES * np.sqrt(expected)
+    return (count > TIMES_EXPECTED * expected) & more
 
 
-def outlying_means(values: Floats, fields: NDArray[np.int64], settings: DiagnosisSettings) -> NDArray[np.bool_]:
+def outlying_means(values: Floats, fields: NDArray[np.int64]) -> NDArray[np.bool_]:
     """(9,) fields whose median of (P,) values, relative rates, stands out from its error, sqrt(pi / 2) sd / sqrt(n),
     from the scatter of the others, and by what is clear of what labels can be known to."""
     mean = np.array([np.median(values[fields == f]) for f in range(FIELDS_PER_SIDE**2)])
@@ -71,8 +86,8 @@ def outlying_means(values: Floats, fields: NDArray[np.int64], settings: Diagnosi
     error = 1.2533 * np.array(
         [values[fields == f].std() / np.sqrt((fields == f).sum()) for f in range(FIELDS_PER_SIDE**2)]
     )
-    chance = settings.concluding.local_noises * np.maximum(np.sqrt(np.mean(inside**2)), error)
-    outlying: NDArray[np.bool_] = off > np.maximum(chance, settings.judging.clear * LABEL_ERROR)
+    chance = LOCAL_NOISES * np.maximum(np.sqrt(np.mean(inside**2)), error)
+    outlying: NDArray[np.bool_] = off > np.maximum(chance, CLEAR * LABEL_ERROR)
     return outlying
 
 
@@ -87,24 +102,23 @@ def rows_and_columns(field: int, shape: tuple[int, int]) -> str:
 def when(case: Case) -> str:
     """From (or until) which part of steady recordings it acts; empty where always."""
     votes = []
-    irregular, settings = np.zeros(2), case.settings
-    share, noises = settings.concluding.large_share, settings.concluding.local_noises
+    irregular = np.zeros(2)
     for c, o in zip(case.conditions, case.observations, strict=True):
-        if c.moves or o.frame.sum() < settings.searching.least_spikes:
+        if c.moves or o.frame.sum() < LEAST_SPIKES:
             continue
         half = o.frames // 2
         own = np.array([o.odd[:half].sum(), o.odd[half:].sum()], np.float64)
         irregular += own
-        votes += later_half(own, noises, share)
+        votes += later_half(own, LOCAL_NOISES, HALF_SHARE)
         halves = [strongest_line(spectrum(part)) for part in (o.frame[:half], o.frame[half:])]
         (_a, first_line), (_b, second_line) = halves
-        if o.frames >= settings.concluding.least_frames:
-            votes += line_in_one_half(first_line, second_line, settings)
+        if o.frames >= LEAST_FRAMES:
+            votes += line_in_one_half(first_line, second_line)
         blocks = o.blocks[:-1] if o.frames % TIME_BLOCKS else o.blocks
-        votes += step_in_the_middle(blocks[:, case.base.live].sum(axis=1).astype(np.float64), noises)
+        votes += step_in_the_middle(blocks[:, case.base.live].sum(axis=1).astype(np.float64), LOCAL_NOISES)
     if len(votes) < 2:
         # few events a recording, but of all together; it is one comparison, not one for each recording
-        votes = later_half(irregular, settings.judging.clear, share)
+        votes = later_half(irregular, CLEAR, HALF_SHARE)
     if not votes:
         return ""
     return "from about half of each recording on" if np.mean(votes) > 0.5 else "until about half of each recording"
@@ -118,12 +132,12 @@ def later_half(halves: Floats, noises: float, share: float) -> list[bool]:
     return [bool(second > first)] if clear else []
 
 
-def line_in_one_half(first: float, second: float, settings: DiagnosisSettings) -> list[bool]:
+def line_in_one_half(first: float, second: float) -> list[bool]:
     """Whether the line of one half alone is in the second, by their powers; nothing where it is in both or in none.
 
     It has to be twice as strong as one of a whole recording."""
     stronger, weaker = max(first, second), min(first, second)
-    clear = stronger > 2 * settings.searching.line and stronger > settings.concluding.line_ratio * weaker
+    clear = stronger > 2 * LINE and stronger > LINE_RATIO * weaker
     return [second > first] if clear else []
 
 

@@ -6,7 +6,6 @@ import pytest
 from small import MODEL
 
 from spikecam_env.gap.candidates.strength import amplified, bounded, with_effect
-from spikecam_env.gap.settings import Twins
 
 
 def test_parameters_are_kept_within_their_bounds_and_whole_where_they_count():
@@ -23,14 +22,14 @@ def test_with_effect_adds_or_replaces_one_effect():
 
 
 def test_a_strong_effect_a_pattern_and_events_are_simulated_as_they_are():
-    assert amplified("dead_time", {"tau_us": 0.2}, 200.0, Twins()) == ({"tau_us": 0.2}, 1.0)
-    assert amplified("vignetting", {"falloff": 0.1}, 20.0, Twins())[1] == 1.0
+    assert amplified("dead_time", {"tau_us": 0.2}, 200.0) == ({"tau_us": 0.2}, 1.0)
+    assert amplified("vignetting", {"falloff": 0.1}, 20.0)[1] == 1.0
     for name, parameters in (("dead_pixels", {"fraction": 0.01}), ("missed_spikes", {"probability": 1e-6})):
-        assert amplified(name, parameters, 5.0, Twins()) == (parameters, 1.0)
-    assert amplified("common_threshold_noise", {"sigma_mV": 1.0}, 10.0, Twins()) == ({"sigma_mV": 1.0}, 1.0)
+        assert amplified(name, parameters, 5.0) == (parameters, 1.0)
+    assert amplified("common_threshold_noise", {"sigma_mV": 1.0}, 10.0) == ({"sigma_mV": 1.0}, 1.0)
     drift = {"rise": 0.01, "tau_ms": 50.0}  # the rate climbs with it, the scatter of intervals with its square
-    assert amplified("dark_current_drift", drift, 10.0, Twins()) == (drift, 1.0)
-    assert amplified("dead_time", {"tau_us": 0.02}, 30.0, Twins()) == (
+    assert amplified("dark_current_drift", drift, 10.0) == (drift, 1.0)
+    assert amplified("dead_time", {"tau_us": 0.02}, 30.0) == (
         {"tau_us": pytest.approx(0.04)},
         pytest.approx(2.0),
     )

@@ -9,6 +9,7 @@ import pytest
 from scipy import special, stats
 
 from spikecam_env.gap.compare.distance import (
+    HEAVY,
     adjusted,
     deviates,
     freedom_of,
@@ -20,6 +21,7 @@ from spikecam_env.gap.compare.distance import (
 )
 from spikecam_env.gap.compare.prediction import (
     PAIR_NOISE,
+    TOLERANCE,
     Draw,
     Null,
     Prediction,
@@ -33,7 +35,7 @@ from spikecam_env.gap.compare.step import slope_of, step_of
 from spikecam_env.gap.settings import Judging
 from spikecam_env.gap.statistics import StatisticKey, floor_of
 
-GATE, HEAVY, TOLERANCE = Judging().gate, Judging().heavy, Judging().tolerance
+GATE = Judging().gate
 
 
 def made_up(mean=0.0, sd=1.0, floor=0.0, twins=12, count=1) -> Null:
@@ -189,12 +191,12 @@ def test_residual_forgives_a_share_of_the_effects_own_size():
 def test_misfit_of_noise_alone_is_about_the_number_of_statistics():
     """E[9 log(1 + z^2 / 8)] = 0.98 of a statistic; 100 000 of them."""
     z = np.random.default_rng(0).standard_normal(100_000)
-    print(f"{robust_squares(z, HEAVY) / z.size:.3f}")
-    assert robust_squares(z, HEAVY) / z.size == pytest.approx(0.98, abs=0.03)
+    print(f"{robust_squares(z) / z.size:.3f}")
+    assert robust_squares(z) / z.size == pytest.approx(0.98, abs=0.03)
 
 
 def test_misfit_grows_with_the_logarithm_of_what_is_far_off():
-    far, further = robust_squares(np.array([1e3]), HEAVY), robust_squares(np.array([1e4]), HEAVY)
+    far, further = robust_squares(np.array([1e3])), robust_squares(np.array([1e4]))
     assert further - far == pytest.approx((HEAVY + 1) * np.log(100), rel=1e-3)
 
 

@@ -8,7 +8,7 @@ import numpy as np
 from small import MODEL, TWINS, effect, null, recorded
 
 from spikecam_env.gap.baseline.null_model import model_null
-from spikecam_env.gap.candidates.strength import with_effect
+from spikecam_env.gap.candidates.strength import MOST_EXTRAPOLATED, with_effect
 from spikecam_env.gap.compare.distance import effect_size, is_significant, residual, residual_and_misfit
 from spikecam_env.gap.compare.prediction import values_of
 from spikecam_env.gap.fit.candidate import Fit, fit
@@ -27,7 +27,7 @@ def test_a_weak_effect_is_told_by_louder_twins_as_well_as_by_many():
     found = fit(Problem(case, MODEL, there, measured, measured), "dead_time", {"tau_us": 0.02})
     size = effect_size(there, measured, found.prediction.mean - there.mean)
     loud, times = amplified_fit(Problem(case, MODEL, there, measured, measured), found, "dead_time")
-    assert 1 < times <= there.settings.twins.most_extrapolated and loud.parameters == found.parameters
+    assert 1 < times <= MOST_EXTRAPOLATED and loud.parameters == found.parameters
     which = [i for i, c in enumerate(case.conditions) if c.use == "fit"]
     many = predict_by_twins(case, found.model, found.base, there, TWINS, which)
     few = predict_by_twins(case, found.model, found.base, there, 2, which)

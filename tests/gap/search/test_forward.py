@@ -16,12 +16,12 @@ from spikecam_env.gap.fit.problem import Problem
 from spikecam_env.gap.screen.screen import Screened
 from spikecam_env.gap.search import forward as search
 from spikecam_env.gap.search import neighbours
-from spikecam_env.gap.search.choice import chosen_of, confirmed_in_order
+from spikecam_env.gap.search.choice import PER_PARAMETER, chosen_of, confirmed_in_order
 from spikecam_env.gap.search.forward import joined
 from spikecam_env.gap.search.neighbours import runner_up, try_in_place_of_earlier
 from spikecam_env.gap.search.rivals import is_rival, lead
 from spikecam_env.gap.search.round import Round, has_candidate, is_improvement, is_visible
-from spikecam_env.gap.settings import PER_PARAMETER, Deviance, DiagnosisSettings, Searching
+from spikecam_env.gap.settings import Deviance, DiagnosisSettings, Searching
 from spikecam_env.gap.statistics import StatisticKey
 from spikecam_env.gap.twins.budget import Budget
 from spikecam_env.gap.unit.conversion import exact_refit
@@ -217,7 +217,7 @@ def test_beside_what_was_found_a_hint_is_enough_to_be_confirmed(monkeypatch):
     """What came first may have taken the share of what comes later: how much both remove, only both together tell."""
     n, _effect, values, seen = campaign()
     rho, before = residual_and_misfit(n, seen, n.prediction)
-    hint = replace(a_fit(n, "crosstalk", 4.0 * n.sd, seen), misfit=before - (DEVIANCE.accept + DEVIANCE.join) / 2)
+    hint = replace(a_fit(n, "crosstalk", 4.0 * n.sd, seen), misfit=before - (DEVIANCE.accept + search.JOIN) / 2)
     asked = []
     monkeypatch.setattr(search, "screened_beside", lambda *_: [])
     monkeypatch.setattr(search, "fits_of", lambda *_: ([hint], {Screened("crosstalk", {}, 0.0, rho): hint}))
@@ -226,7 +226,7 @@ def test_beside_what_was_found_a_hint_is_enough_to_be_confirmed(monkeypatch):
     problem = Problem(recorded(), MODEL, n, seen, values)
     search.with_candidates(problem, problem, [], {}, first)
     assert not asked
-    search.with_candidates(problem, problem, [], {}, replace(first, to_join=DEVIANCE.join))
+    search.with_candidates(problem, problem, [], {}, replace(first, to_join=search.JOIN))
     assert asked == [hint]
 
 
@@ -261,8 +261,8 @@ def test_a_hint_of_another_bend_is_none():
     n, change, _, seen = campaign()
     hint = a_fit(n, "crosstalk", change, seen)
     beside = MODEL.with_effect(DEAD_TIME)
-    before = hint.misfit + (DEVIANCE.accept + DEVIANCE.join) / 2
-    turn = Round(beside, unit(), n.prediction, seen, before, (hint,), to_join=DEVIANCE.join)
+    before = hint.misfit + (DEVIANCE.accept + search.JOIN) / 2
+    turn = Round(beside, unit(), n.prediction, seen, before, (hint,), to_join=search.JOIN)
     bend = replace(turn, fits=(replace(hint, name="comparator_delay"),))
     assert has_candidate(turn, n) and not has_candidate(bend, n)
     assert has_candidate(replace(bend, model=MODEL), n), "it is the first"

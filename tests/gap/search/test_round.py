@@ -12,7 +12,6 @@ from spikecam_env.gap.compare.prediction import Null, Prediction
 from spikecam_env.gap.fit.candidate import Fit
 from spikecam_env.gap.search.neighbours import runner_up
 from spikecam_env.gap.search.round import Round, absent, is_small_share, is_visible
-from spikecam_env.gap.settings import Searching
 from spikecam_env.gap.statistics import StatisticKey
 
 KEYS = tuple(StatisticKey("rates", "r", str(i)) for i in range(10))
@@ -41,7 +40,7 @@ def test_an_effect_of_random_course_changes_no_mean():
     "later, removed, small", [(False, 0.15, True), (False, 0.3, False), (True, 0.35, True), (True, 0.7, False)]
 )
 def test_less_than_a_fifth_of_what_is_beyond_chance_is_little_and_later_less_than_half(later, removed, small):
-    assert is_small_share(TURN, 1000.0 - removed * 800.0, 200.0, later, Searching()) == small
+    assert is_small_share(TURN, 1000.0 - removed * 800.0, 200.0, later) == small
 
 
 @pytest.mark.parametrize(

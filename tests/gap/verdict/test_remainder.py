@@ -7,13 +7,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from spikecam_env.gap.compare.distance import robust_squares
-from spikecam_env.gap.compare.prediction import Null, Prediction
-from spikecam_env.gap.settings import Judging
+from spikecam_env.gap.compare.distance import HEAVY, robust_squares
+from spikecam_env.gap.compare.prediction import TOLERANCE, Null, Prediction
 from spikecam_env.gap.statistics import StatisticKey
 from spikecam_env.gap.verdict.remainder import explains, remainder_of
-
-HEAVY, TOLERANCE = Judging().heavy, Judging().tolerance
 
 PLACES = ("pattern flat", "rates flat", "rates dark", "drift dark")
 KEYS = tuple(StatisticKey(*place.split(), str(n)) for place in PLACES for n in range(25))
@@ -46,8 +43,8 @@ def test_a_name_leaves_a_quarter_of_the_squares_of_a_group_at_most(share: float,
 @pytest.mark.parametrize("share, explained", [(0.03, True), (0.08, False)])
 def test_a_name_leaves_a_twentieth_of_the_deviance_at_most(share: float, explained: bool) -> None:
     """All statistics are 300 noises off before; one is left at 6, no chance, and the others share the rest evenly."""
-    before, one = np.full(COUNT, 300.0), robust_squares(np.array([6.0]), HEAVY)
-    each = (COUNT + share * (robust_squares(before, HEAVY) - COUNT) - one) / (COUNT - 1)
+    before, one = np.full(COUNT, 300.0), robust_squares(np.array([6.0]))
+    each = (COUNT + share * (robust_squares(before) - COUNT) - one) / (COUNT - 1)
     left = np.full(COUNT, np.sqrt(HEAVY * np.expm1(each / (HEAVY + 1.0))))
     left[0] = 6.0
     print(f"{left[1]:.1f} noises each")

@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 from small import FRAMES, SHAPE, case_from, effect, recorded, spikes_of
 
-from spikecam_env.gap.settings import Concluding, DiagnosisSettings
 from spikecam_env.gap.verdict.where_and_when import (
     later_half,
     line_in_one_half,
@@ -16,8 +15,6 @@ from spikecam_env.gap.verdict.where_and_when import (
     when,
     where,
 )
-
-LIMITS = Concluding()
 
 SOME = [
     effect("spurious_spikes", probability=0.002),
@@ -89,7 +86,7 @@ NINE = np.repeat(np.arange(9), 100)
 def test_a_field_has_to_have_twice_the_irregular_intervals(inside: float, stands_out: bool) -> None:
     """Of 10 000 a field, so that the noise of counts is no matter."""
     irregular = np.where(NINE == 4, 100.0 * inside, 100.0)
-    assert outlying_counts(irregular, NINE, LIMITS)[4] == stands_out and not outlying_counts(irregular, NINE, LIMITS)[5]
+    assert outlying_counts(irregular, NINE)[4] == stands_out and not outlying_counts(irregular, NINE)[5]
 
 
 @pytest.mark.parametrize("noises, stands_out", [(6.0, False), (10.0, True)])
@@ -97,12 +94,12 @@ def test_a_field_of_few_irregular_intervals_has_to_stand_out_of_their_noise(nois
     """Four are expected of a field: eight noises are sixteen more."""
     irregular = np.full(900, 0.04)
     irregular[NINE == 4] = (4 + noises * 2) / 100
-    assert outlying_counts(irregular, NINE, LIMITS)[4] == stands_out
+    assert outlying_counts(irregular, NINE)[4] == stands_out
 
 
 @pytest.mark.parametrize("off, stands_out", [(0.7e-4, False), (1.4e-4, True)])
 def test_a_field_has_to_be_off_by_more_than_labels_can_be(off: float, stands_out: bool) -> None:
-    assert outlying_means(np.where(NINE == 4, off, 0.0), NINE, DiagnosisSettings())[4] == stands_out
+    assert outlying_means(np.where(NINE == 4, off, 0.0), NINE)[4] == stands_out
 
 
 @pytest.mark.parametrize("off, stands_out", [(6e-3, False), (14e-3, True)])
@@ -110,7 +107,7 @@ def test_a_field_has_to_be_off_by_eight_times_the_scatter_of_the_others(off: flo
     """The others are at plus and minus 1e-3; of the six nearest to the median, 1e-3, the scatter is 1.15e-3."""
     values = np.array([1, -1, 1, -1, 0, 1, -1, 1, -1], float)[NINE] * 1e-3
     values[NINE == 4] = off
-    assert outlying_means(values, NINE, DiagnosisSettings())[4] == stands_out
+    assert outlying_means(values, NINE)[4] == stands_out
 
 
 def test_halves_have_to_differ_by_noise_and_by_a_share() -> None:
@@ -129,7 +126,7 @@ def test_halves_have_to_differ_by_noise_and_by_a_share() -> None:
     "first, second, said", [(1, 40, []), (1, 80, [True]), (80, 1, [False]), (200, 800, []), (100, 800, [True])]
 )
 def test_a_line_is_of_one_half_where_it_is_strong_there_and_weak_in_the_other(first, second, said) -> None:
-    assert line_in_one_half(first, second, DiagnosisSettings()) == said
+    assert line_in_one_half(first, second) == said
 
 
 def test_a_step_in_the_middle_has_to_be_beyond_labels_and_explain_the_change() -> None:
