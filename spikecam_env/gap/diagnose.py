@@ -13,6 +13,7 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from pathlib import Path
+from typing import Any
 
 from tqdm import tqdm
 
@@ -22,7 +23,6 @@ from spikecam_env.gap.baseline.contradiction import Contradiction
 from spikecam_env.gap.baseline.halves_floor import floor_of_halves
 from spikecam_env.gap.baseline.label_audit import audit, upheld
 from spikecam_env.gap.baseline.missing_from_refit import missing_effects, with_missing
-from spikecam_env.gap.baseline.motion import DetectedMotion
 from spikecam_env.gap.baseline.null_model import model_null
 from spikecam_env.gap.baseline.off_nominal import OffNominal, off_nominal
 from spikecam_env.gap.baseline.static_part import Observed, looked_at, without_motion
@@ -35,7 +35,7 @@ from spikecam_env.gap.maps import diagnose_maps
 from spikecam_env.gap.observe.conditions import STEADY_KNOWN, Condition, condition_of, observe_all
 from spikecam_env.gap.report.evidence import evidence_for
 from spikecam_env.gap.report.sentence import BOUNDS_OF_MAPS, sentence, unbounded, unfinished
-from spikecam_env.gap.result import BOUNDED_VERDICTS, Bound, Conclusion, Diagnosis, Evidence
+from spikecam_env.gap.result import BOUNDED_VERDICTS, Bound, Conclusion, Diagnosis, Findings
 from spikecam_env.gap.screen.templates import Templates
 from spikecam_env.gap.search.forward import forward_selection
 from spikecam_env.gap.search.round import Round
@@ -109,63 +109,38 @@ def diagnose(
     tested = replace(tested, frame_rate_hz=measured.frame_rate_hz)
     names = chosen(tested, candidates, exclude)
     if any(r.spikes for r in measured.recordings):
-        asked = DiagnosisRequest(tuple(names), seed, jobs, effort, twin_count, static_only, settings, bounds)
-        found = of_spikes(measured, tested, asked, templates, stages)
+        request = DiagnosisRequest(tuple(names), seed, jobs, effort, twin_count, static_only, settings, bounds)
+        findings = of_spikes(measured, tested, request, templates, stages)
     else:
         with stages.timed("maps"):
-            of_maps = diagnose_maps(measured, tested, names, seed, jobs, settings)
-            found = Findings(*of_maps, notes=(BOUNDS_OF_MAPS,) if bounds else ())
-    conclusion = found.conclusion
+            conclusion, evidence = diagnose_maps(measured, tested, names, seed, jobs, settings)
+            findings = findings_of(conclusion, [BOUNDS_OF_MAPS] if bounds else [], evidence=evidence)
     model_name = tested.name if isinstance(model, SensorModel) else str(model)
     return Diagnosis(
-        verdict=conclusion.verdict,
-        sentence=sentence(conclusion, model_name),
-        effects=conclusion.effects,
-        unknown=conclusion.unknown,
-        class_=conclusion.class_,
-        parameters=conclusion.parameters,
-        data=(*conclusion.notes, *found.notes),
-        gap=conclusion.gap,
-        statistics=conclusion.statistics,
-        ranking=conclusion.ranking,
-        not_testable=conclusion.not_testable,
-        bounds=found.bounds,
-        with_bounds=bounds,
-        patched=conclusion.patched,
+        **vars(findings),
+        sentence=sentence(findings, model_name),
         model_name=model_name,
         campaign=str(measured.folder),
         seed=seed,
         stages=stages.seconds,
         candidates=None if candidates is None else tuple(candidates),
         exclude=tuple(exclude),
-        evidence=found.evidence,
-        simulated=found.simulated,
         effort=effort,
-        not_bounded=found.not_bounded,
         effect_files=files_of((*names, *(effect.name for effect in tested.effects))),
-        motion=found.motion,
         static_only=static_only,
-        remainder=conclusion.remainder,
         settings=settings.changed(),
+        with_bounds=bounds,
     )
 
 
-@dataclass(frozen=True)
-class Findings:
-    """What becomes of a campaign and a model.  notes: on labels and on what was left out."""
-
-    conclusion: Conclusion
-    evidence: Evidence | None
-    bounds: tuple[Bound, ...] = ()
-    not_bounded: tuple[tuple[str, str], ...] = ()
-    notes: tuple[str, ...] = ()
-    simulated: int = 0
-    motion: tuple[DetectedMotion, ...] = ()
+def findings_of(conclusion: Conclusion, notes: Sequence[str], **others: Any) -> Findings:
+    """A conclusion with notes on labels and on parts that were left out, and with other fields of `Findings`."""
+    return Findings(**vars(conclusion) | {"data": (*conclusion.data, *notes)} | others)
 
 
 @dataclass(frozen=True)
 class DiagnosisRequest:
-    """How a campaign is to be diagnosed: names of candidates, and options as of `diagnose`."""
+    """Options of `diagnose`, with the names of candidates."""
 
     names: tuple[str, ...]
     seed: int
@@ -178,19 +153,19 @@ class DiagnosisRequest:
 
 
 def of_spikes(
-    measured: Campaign, tested: SensorModel, asked: DiagnosisRequest, templates: Templates | None, stages: Stages
+    measured: Campaign, tested: SensorModel, request: DiagnosisRequest, templates: Templates | None, stages: Stages
 ) -> Findings:
     """A campaign of spikes, from its files to what a diagnosis says of it: one room after another."""
     with stages.timed("read"):
         seen = observed(measured)
     with stages.timed("motion"):
-        seen, motion = without_motion(seen, static_only=asked.static_only, settings=asked.settings)
+        seen, motion = without_motion(seen, static_only=request.static_only, settings=request.settings)
     if motion and not seen.recordings:
-        return Findings(moves(tested, motion, static_only=asked.static_only), None, motion=motion)
+        return findings_of(moves(tested, motion, static_only=request.static_only), [], motion=motion)
     with stages.timed("refit"):
-        case = case_of_observed(measured, seen, asked.seed, asked.jobs, asked.settings)
+        case = case_of_observed(measured, seen, request.seed, request.jobs, request.settings)
         notes = [*static_note(motion), *label_unit_note(case.nominal_per_label, case.base)]
-    comparison = comparison_of(case, tested, asked, stages)
+    comparison = comparison_of(case, tested, request, stages)
     case, null, values = comparison.case, comparison.null, comparison.values
     rounds: list[Round] = []
     if comparison.disagrees:
@@ -207,13 +182,19 @@ def of_spikes(
         evidence = evidence_for(comparison, rounds, conclusion)
     bounded: list[Bound] = []
     not_bounded: list[tuple[str, str]] = []
-    if asked.bounds and conclusion.verdict in BOUNDED_VERDICTS:
+    if request.bounds and conclusion.verdict in BOUNDED_VERDICTS:
         with stages.timed("bounds"):
             standard = templates or templates_of(comparison.names, jobs=case.jobs, progress=stages.progress)
             bounded, not_bounded = upper_bounds(case, comparison.model, null, values, comparison.names, standard)
-    notes += [*unbounded(conclusion.verdict, asked.bounds), *unfinished(case.budget)]
-    return Findings(
-        conclusion, evidence, tuple(bounded), tuple(not_bounded), tuple(notes), case.budget.simulated, motion
+    notes += [*unbounded(conclusion.verdict, request.bounds), *unfinished(case.budget)]
+    return findings_of(
+        conclusion,
+        notes,
+        evidence=evidence,
+        bounds=tuple(bounded),
+        not_bounded=tuple(not_bounded),
+        simulated=case.budget.simulated,
+        motion=motion,
     )
 
 
@@ -269,20 +250,20 @@ def refittable(conditions: Sequence[Condition]) -> bool:
     return scenes or sum(c.kind in STEADY_KNOWN and c.use == "fit" for c in conditions) >= 2
 
 
-def comparison_of(case: Case, tested: SensorModel, asked: DiagnosisRequest, stages: Stages) -> Comparison:
+def comparison_of(case: Case, tested: SensorModel, request: DiagnosisRequest, stages: Stages) -> Comparison:
     """The case beside a model, without a search: labels that contradict, effects that the refit says are missing, what
     is off nominal, and the null model's twins."""
     with stages.timed("audit"):
         contradictions = upheld(case, tested, audit(case))
         case = trimmed(case, contradictions)
-        limit = asked.effort * len(case.conditions)
+        limit = request.effort * len(case.conditions)
         case = replace(case, budget=Budget(limit, verdict_known=bool(contradictions)))
-    names, not_testable = testable(asked.names, case.conditions)
+    names, not_testable = testable(request.names, case.conditions)
     lacking = missing_effects(case, tested, names)
     model = with_missing(tested, lacking)
     off = OffNominal({}, case.base) if lacking else off_nominal(case, tested, case.base)
     with stages.timed("twins"):
-        null = model_null(case, model, asked.twin_count)
+        null = model_null(case, model, request.twin_count)
         differs = lacking or off.parameters
         given = model_null(replace(case, base=off.nominal), tested, case.settings.twins.to_confirm) if differs else null
     return Comparison(

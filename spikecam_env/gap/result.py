@@ -1,4 +1,4 @@
-"""What a diagnosis says: format `spikecam-diagnosis/1` (docs/gap.md), and what its report shows beside it."""
+"""The result of a diagnosis: format `spikecam-diagnosis/1` (docs/gap.md), and the evidence of its report."""
 
 from __future__ import annotations
 
@@ -18,6 +18,7 @@ from spikecam_env.gap.observe.observation import ObservedRecording
 from spikecam_env.gap.twins.budget import CAMPAIGNS
 from spikecam_env.gap.unit.refit import BaseFit
 from spikecam_env.sensor import SensorModel
+from spikecam_env.types import Floats
 from spikecam_env.whole import whole_folder, write_text_whole
 
 DIAGNOSIS_FORMAT = "spikecam-diagnosis/1"
@@ -26,15 +27,13 @@ VERDICTS = ("none", "named", "class", "unknown", "parameter", "data")
 
 @dataclass(frozen=True)
 class Estimate:
-    """A parameter's value, its standard deviation, and where it is with 90 %, in the parameter's unit.
-
-    interval: low and high, of the coordinate in which it was fitted and within its range (`fit.coordinates`); None
-    where no error is known.
-    """
+    """A parameter's value with its errors, in the parameter's unit."""
 
     value: float
     sd: float
+    """Standard deviation."""
     interval: tuple[float, float] | None = None
+    """Low and high end of 90 %, of the coordinate that was fitted (`fit.coordinates`); None where no error is known."""
 
 
 MOST_CONFIDENCE = 0.99
@@ -43,20 +42,21 @@ MOST_CONFIDENCE = 0.99
 
 @dataclass(frozen=True)
 class NamedEffect:
-    """An effect found.  confidence: 0 to 1.  alternatives: (name, confidence), best first.
-
-    where, when: the part of the array or of the time that it acts in; empty for everywhere and always.
-    instead: share of the gap that an alternative would remove in its place, by name.
-    """
+    """An effect found."""
 
     name: str
     family: str
     confidence: float
+    """0 to 1."""
     parameters: dict[str, Estimate]
     alternatives: tuple[tuple[str, float], ...] = ()
+    """(name, confidence), best first."""
     where: str = ""
+    """The part of the array that it acts in; empty for everywhere."""
     when: str = ""
+    """The part of the time that it acts in; empty for always."""
     instead: dict[str, float] = field(default_factory=dict)
+    """Share of the gap that an alternative would remove in its place, by name."""
 
     def to_json(self) -> dict[str, Any]:
         """The documented format."""
@@ -70,88 +70,99 @@ class NamedEffect:
 
 @dataclass(frozen=True)
 class Remainder:
-    """What is left beyond chance beside effects that are named: where their law differs from the catalogue's.
-
-    noises: largest deviate left.  share: of the sum of squares beyond chance, of all recordings.  worst: the statistic
-    that is left off most, recordings: those of statistics left off, the worst first.  groups: share of each group of
-    statistics in what is left, largest first.  where, when: as of `NamedEffect`.
-    """
+    """The rest beyond chance beside named effects, where their law differs from the catalogue's."""
 
     noises: float
+    """Largest deviate left."""
     share: float
+    """Of the sum of squares beyond chance, of all recordings."""
     worst: str
+    """The statistic that is left off most."""
     groups: dict[str, float]
+    """Share of each group of statistics, largest first."""
     recordings: tuple[str, ...]
+    """Those of statistics left off, the worst first."""
     where: str = ""
+    """As of `NamedEffect`."""
     when: str = ""
 
 
 @dataclass(frozen=True)
 class Statistic:
-    """One number of the bank, measured and simulated.
-
-    group: what it looks at (rates, noise, spectrum ...).  before, after: mean over twins under the model as given and
-    as patched; sd: of one campaign, under the model as given.  z: (measured - before) / sd, as a normal deviate.
-    z_after: the same of what is left.  holdout: whether its recordings were held out.
-    """
+    """One number of the bank, measured and simulated."""
 
     name: str
     group: str
+    """Rates, noise, spectrum, ..."""
     recordings: tuple[str, ...]
     measured: float
     before: float
+    """Mean over twins under the model as given."""
     after: float
+    """The same as patched."""
     sd: float
+    """Of one campaign, under the model as given."""
     z: float
+    """(measured - before) / sd, as a normal deviate."""
     z_after: float
+    """The same of (measured - after)."""
     p_adjusted: float
     holdout: bool
+    """Whether its recordings were held out."""
 
 
 @dataclass(frozen=True)
 class Ranked:
-    """A candidate that was tried.  misfit: heavy-tailed sum of squares of what it leaves; parameters: at the best.
-
-    misfit_before: of what the candidates of its step were added to.  reason: why it was accepted or rejected.
-    """
+    """A candidate that was tried."""
 
     name: str
     family: str
     misfit_before: float
+    """Misfit of the model that the candidates of its step were added to."""
     misfit: float
+    """Heavy-tailed sum of squares that it leaves."""
     parameters: dict[str, Estimate]
+    """At the best."""
     accepted: bool
     reason: str
+    """Why it was accepted or rejected."""
 
 
 LEAST_STATED = 0.05
-"""Of the misfit, from which what a candidate removes is stated with one decimal."""
+"""Misfit that a candidate removes, from which it is stated with one decimal."""
 
 
-def why_rejected(misfit: float, before: float, best: str, asked: float) -> str:
-    """Why a candidate was not added, by its misfit alone.  before: what its step started from; best: the candidate
-    that was preferred; asked: what has to be removed of the misfit for an effect to be added."""
+def why_rejected(misfit: float, before: float, best: str, needed: float) -> str:
+    """Why a candidate was not added, by its misfit alone.
+
+    Args:
+        misfit: that the candidate leaves.
+        before: misfit that its step started from.
+        best: the candidate that was preferred.
+        needed: misfit that an effect has to remove to be added.
+    """
     removed = before - misfit
     if removed < LEAST_STATED:
         return "explains nothing"
-    if removed < asked:
-        return f"removes {removed:.1f} of the misfit; an effect must remove {asked:g}"
+    if removed < needed:
+        return f"removes {removed:.1f} of the misfit; an effect must remove {needed:g}"
     return f"larger misfit than {best.replace('_', ' ')}"
 
 
 @dataclass(frozen=True)
 class Bound:
-    """Upper bound (95 %, `verdict.bounds`) of an effect not found.  at: its other parameters there, by name."""
+    """Upper bound (95 %, `verdict.bounds`) of an effect not found."""
 
     name: str
     parameter: str
     unit: str
     below: float
     at: dict[str, float] = field(default_factory=dict)
+    """Its other parameters there, by name."""
 
 
 BOUNDED_VERDICTS = ("none", "parameter")
-"""Verdicts with upper bounds of the effects that were not found, where they are asked for."""
+"""Verdicts with upper bounds of the effects that were not found, with `bounds=True`."""
 
 SIGNIFICANT = 0.05
 """Adjusted p-value below which a statistic is listed as one that differs."""
@@ -166,16 +177,16 @@ by chance, by a quarter of itself, sqrt(2 / 30)."""
 
 @dataclass(frozen=True)
 class Gap:
-    """Mean square distance of held-out statistics, in noise.
-
-    floor: of two halves of the measurement; in the pattern, of two units.  removed: share that is gone after.
-    """
+    """Mean square distance of held-out statistics, in noise."""
 
     before: float
     after: float
     floor: float
+    """Of two halves of the measurement; in the pattern, of two units."""
     removed: float
+    """Share that is gone after."""
     by_recording: dict[str, dict[str, float]]
+    """{recording: {before, after, floor}}."""
 
     @classmethod
     def of(
@@ -193,12 +204,7 @@ LABELLED_LIGHT, NOMINAL_LIGHT = "radiance [unit of the labels]", "radiance [nomi
 
 @dataclass(frozen=True)
 class Evidence:
-    """What the report draws: conditions and observations of the measurement, and of one twin before and after.
-
-    again: another twin of the model before, with another seed: what chance alone makes differ.
-    drawn_before, drawn_after: gain and dark (P,) of a fresh unit of each model (`fresh_units.drawn_response`): the
-    fixed pattern to expect, where twins have the measured one.  light: the name of the axis of light.
-    """
+    """Recordings that the report draws: of the measurement, and of one twin before and after."""
 
     conditions: tuple[Condition, ...]
     measured: tuple[ObservedRecording, ...]
@@ -208,65 +214,66 @@ class Evidence:
     before_base: BaseFit
     after_base: BaseFit | None
     again: tuple[ObservedRecording, ...] | None = None
-    drawn_before: tuple[NDArray[np.float64], NDArray[np.float64]] | None = None
-    drawn_after: tuple[NDArray[np.float64], NDArray[np.float64]] | None = None
+    """Another twin of the model before, with another seed: the difference that chance alone makes."""
+    drawn_before: tuple[Floats, Floats] | None = None
+    """Gain and dark (P,) of a fresh unit of the model before (`fresh_units.drawn_response`): the fixed pattern to
+    expect, where twins have the measured one."""
+    drawn_after: tuple[Floats, Floats] | None = None
+    """The same of the model after."""
     light: str = LABELLED_LIGHT
+    """Name of the axis of light."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Conclusion:
-    """What the rooms of a diagnosis find, before it is put in words: fields as in `Diagnosis`.
-
-    notes: contradictions first, then how the gap is to be read (`verdict.notes.Note`).
-    """
+    """A verdict and its reasons, before they are put in words."""
 
     verdict: str
-    effects: tuple[NamedEffect, ...]
-    unknown: dict[str, Any] | None
-    class_: dict[str, Any] | None
-    parameters: dict[str, dict[str, float]]
-    notes: tuple[str, ...]
-    gap: Gap | None
-    statistics: tuple[Statistic, ...]
-    ranking: tuple[Ranked, ...]
-    not_testable: tuple[tuple[str, str], ...]
+    """One of `VERDICTS`."""
+    effects: tuple[NamedEffect, ...] = ()
+    """Named effects."""
+    unknown: dict[str, Any] | None = None
+    """For verdict `unknown`, the structure of the difference."""
+    class_: dict[str, Any] | None = None
+    """For verdict `class`, {"members": [...], "experiment": "..."}."""
+    parameters: dict[str, dict[str, float]] = field(default_factory=dict)
+    """Of the model's effects whose strength is off: {effect: {measured, nominal, ratio}}."""
+    data: tuple[str, ...] = ()
+    """Notes on the recordings: contradictions first (for verdict `data`), then how the gap is to be read
+    (`verdict.notes.Note`), then labels and pixels that were left out."""
+    gap: Gap | None = None
+    """On the held-out recordings; None where nothing is held out."""
+    statistics: tuple[Statistic, ...] = ()
+    """Every statistic, measured and simulated."""
+    ranking: tuple[Ranked, ...] = ()
+    """Candidates that were tried."""
+    not_testable: tuple[tuple[str, str], ...] = ()
+    """(name, need) of effects that these recordings cannot show."""
     patched: SensorModel
+    """The model with the effects found, or with an empirical patch; loads back as a model."""
     remainder: Remainder | None = None
+    """For verdict `named`, the difference beyond chance that remains; None where nothing does."""
 
 
-@dataclass(frozen=True)
-class Diagnosis:
+@dataclass(frozen=True, kw_only=True)
+class Findings(Conclusion):
+    """A conclusion with its evidence and bounds."""
+
+    evidence: Evidence | None = field(default=None, repr=False)
+    """Recordings and twins that the report draws."""
+    bounds: tuple[Bound, ...] = ()
+    """Upper bounds of effects that were not found; empty unless `diagnose` was called with bounds=True."""
+    not_bounded: tuple[tuple[str, str], ...] = ()
+    """(name, need) of effects that were not found and have no bound."""
+    simulated: int = 0
+    """Number of recordings simulated, without those that the report draws."""
+    motion: tuple[DetectedMotion, ...] = ()
+    """Of recordings that are labelled static."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Diagnosis(Findings):
     """The answer of a diagnosis.
-
-    Args:
-        verdict: one of `VERDICTS`.
-        sentence: the answer in words.
-        effects: named effects.
-        unknown: for verdict `unknown`, the structure of the difference.
-        class_: for verdict `class`, {"members": [...], "experiment": "..."}.
-        parameters: of the model's effects whose strength is off: {effect: {measured, nominal, ratio}}.
-        data: notes on the recordings; for verdict `data`, the contradictions.
-        gap: on the held-out recordings; None where nothing is held out.
-        statistics: every statistic, measured and simulated.
-        ranking: candidates that were tried.
-        not_testable: (name, what is needed) of effects that these recordings cannot show.
-        bounds: upper bounds of effects that were not found; empty unless `diagnose` was called with bounds=True.
-        patched: the model with the effects found, or with an empirical patch; loads back as a model.
-        model_name: of the model that was tested.
-        campaign: its folder.
-        seed: of all simulations.
-        stages: seconds by stage.
-        candidates, exclude: as given to `diagnose`; None: all of the catalogue.
-        evidence: recordings and twins that the report draws.
-        simulated: number of recordings simulated, without those that the report draws.
-        effort: the budget [campaigns].
-        not_bounded: (name, what is needed) of effects that were not found and have no bound.
-        effect_files: of a user's own effects, among the model's and those tried.
-        motion: of recordings that are labelled static.
-        static_only: whether moving pixels were left out.
-        remainder: for verdict `named`, the difference beyond chance that remains; None where nothing does.
-        settings: those that differ from the defaults, by "stage.name".
-        with_bounds: whether upper bounds were to be simulated.
 
     Example:
         >>> flats = [Dark(), *(Flat(radiance=level) for level in (0.1, 0.3))]
@@ -278,35 +285,30 @@ class Diagnosis:
         'spikecam-diagnosis/1'
     """
 
-    verdict: str
     sentence: str
-    effects: tuple[NamedEffect, ...]
-    unknown: dict[str, Any] | None
-    class_: dict[str, Any] | None
-    parameters: dict[str, dict[str, float]]
-    data: tuple[str, ...]
-    gap: Gap | None
-    statistics: tuple[Statistic, ...]
-    ranking: tuple[Ranked, ...]
-    not_testable: tuple[tuple[str, str], ...]
-    bounds: tuple[Bound, ...]
-    patched: SensorModel
+    """The answer in words."""
     model_name: str
+    """Of the model that was tested."""
     campaign: str
+    """Its folder."""
     seed: int
+    """Of all simulations."""
     stages: dict[str, float]
+    """Seconds by stage."""
     candidates: tuple[str, ...] | None = None
+    """As given to `diagnose`; None: all of the catalogue."""
     exclude: tuple[str, ...] = ()
-    evidence: Evidence | None = field(default=None, repr=False)
-    simulated: int = 0
+    """As given to `diagnose`."""
     effort: float = CAMPAIGNS
-    not_bounded: tuple[tuple[str, str], ...] = ()
+    """The budget [campaigns]."""
     effect_files: tuple[str, ...] = ()
-    motion: tuple[DetectedMotion, ...] = ()
+    """Of a user's own effects, among the model's and those tried."""
     static_only: bool = False
-    remainder: Remainder | None = None
+    """Whether moving pixels were left out."""
     settings: dict[str, Any] = field(default_factory=dict)
+    """Those that differ from the defaults, by "stage.name"."""
     with_bounds: bool = False
+    """Whether upper bounds were to be simulated."""
 
     @property
     def static_share(self) -> float:
@@ -315,7 +317,7 @@ class Diagnosis:
 
     def to_json(self) -> dict[str, Any]:
         """The documented format."""
-        found = [s for s in self.statistics if s.p_adjusted < SIGNIFICANT]
+        off = sorted((s for s in self.statistics if s.p_adjusted < SIGNIFICANT), key=lambda s: -abs(s.z))
         return {
             "format": DIAGNOSIS_FORMAT,
             "verdict": self.verdict,
@@ -335,7 +337,7 @@ class Diagnosis:
                     "z": s.z,
                     "p_adjusted": s.p_adjusted,
                 }
-                for s in sorted(found, key=lambda s: -abs(s.z))
+                for s in off
             ],
             "not_testable": [{"name": n, "needs": w} for n, w in self.not_testable],
             "bounds": [asdict(b) for b in self.bounds],

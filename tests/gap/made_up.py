@@ -127,7 +127,7 @@ def _plain(verdict: str, sentence: str, **others) -> Diagnosis:
         "stages": {"audit": 0.4, "read": 1.2, "base refit": 3.1, "statistics": 9.8, "alarm": 0.2, "candidates": 31.5,
                    "gate": 12.0, "held-out": 5.5},
     } | others  # fmt: skip
-    return Diagnosis(verdict, sentence, **settings)
+    return Diagnosis(verdict=verdict, sentence=sentence, **settings)
 
 
 def _ranking(best: str, parameters: dict[str, Estimate]) -> tuple[Ranked, ...]:

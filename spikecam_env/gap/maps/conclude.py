@@ -80,7 +80,7 @@ def conclude_maps(
         unknown=None if explained else maps_structure(null, rho, left, found),
         class_=None,
         parameters=parameters,
-        notes=(note_on_what_is_left(null, rho, left),) if rounds and explained and significant else (),
+        data=(note_on_what_is_left(null, rho, left),) if rounds and explained and significant else (),
         gap=gap_of_maps(case, null, values, predicted),
         statistics=map_statistics(case, null, values, predicted, rho),
         ranking=tuple(

@@ -72,7 +72,7 @@ def parameter_sentence(found: Conclusion, model_name: str) -> str:
 
 def data_sentence(found: Conclusion, model_name: str) -> str:
     """The first contradiction."""
-    said = found.notes[0].rstrip(".") if found.notes else "see the notes"
+    said = found.data[0].rstrip(".") if found.data else "see the notes"
     return f"The recordings contradict their own labels: {said}."
 
 
@@ -97,7 +97,7 @@ def removed_phrase(found: Conclusion, what: str) -> str:
     gap = found.gap
     if gap is None or not math.isfinite(gap.removed) or gap.removed <= 0:
         return ""
-    fitted = gap_is_fitted(found.notes)
+    fitted = gap_is_fitted(found.data)
     which = "the held-out recordings, which were fitted too" if fitted else "recordings that were not used"
     return f"; adding {what} removes {100 * min(gap.removed, 1.0):.0f} % of the gap on {which}"
 

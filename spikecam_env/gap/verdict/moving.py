@@ -17,19 +17,8 @@ TO_DO_IN_KNOWN_LIGHT = "In known light, give the light over time (an .npz) as th
 
 def moves(model: SensorModel, motion: tuple[DetectedMotion, ...], *, static_only: bool) -> Conclusion:
     """The verdict `data`: nothing was compared."""
-    return Conclusion(
-        verdict="data",
-        effects=(),
-        unknown=None,
-        class_=None,
-        parameters={},
-        notes=(*(m.text for m in motion), *what_to_do(motion, static_only)),
-        gap=None,
-        statistics=(),
-        ranking=(),
-        not_testable=(),
-        patched=model,
-    )
+    notes = (*(m.text for m in motion), *what_to_do(motion, static_only))
+    return Conclusion(verdict="data", data=notes, patched=model)
 
 
 def what_to_do(motion: tuple[DetectedMotion, ...], static_only: bool) -> list[str]:

@@ -59,7 +59,7 @@ def conclude(comparison: Comparison, rounds: Sequence[Round], floor: float) -> C
         unknown=described(comparison, found) if verdict == "unknown" else None,
         class_=tied(found) if verdict == "class" else None,
         parameters=off,
-        notes=(*(c.text for c in comparison.contradictions), *notes_of([r for _, r in found])),
+        data=(*(c.text for c in comparison.contradictions), *notes_of([r for _, r in found])),
         gap=gap_of(case, null, comparison.values, comparison.given, last, usable_floor(floor)),
         statistics=statistics_rows(comparison, last.mean, left),
         ranking=ranking(rounds, found, null.settings.deviance.accept),

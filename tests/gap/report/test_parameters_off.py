@@ -11,7 +11,6 @@ import pytest
 from spikecam_env.gap.report.page import report
 from spikecam_env.gap.report.parameters_off import parameters_off, response_spread
 from spikecam_env.gap.report.sentence import sentence
-from spikecam_env.gap.result import Conclusion
 from spikecam_env.sensor import SensorModel
 
 SCSIM = SensorModel.preset("scsim")
@@ -45,8 +44,7 @@ def test_one_spread_alone_keeps_its_name_and_unit() -> None:
 
 def test_the_headline_and_the_page_name_one_spread() -> None:
     d = replace(made_up.named(), parameters=off(0.3), patched=SCSIM, evidence=None)
-    held = {f: getattr(d, f) for f in ("verdict", "effects", "unknown", "class_", "parameters", "gap", "statistics")}
-    said = sentence(Conclusion(**held, notes=(), ranking=(), not_testable=(), patched=SCSIM), "scsim")
+    said = sentence(d, "scsim")
     assert said.endswith("Parameters of the model scsim are off as well: response spread is 2.21 %, not 7.35 %.")
     page = report(d)
     assert page.count("response spread: sigma") == 1 and "capacitor spread: sigma" not in page

@@ -3,20 +3,19 @@
 from __future__ import annotations
 
 import json
-from dataclasses import fields, replace
+from dataclasses import replace
 
 import made_up
 import pytest
 
 from spikecam_env.gap.report.sentence import gap_line, sentence
-from spikecam_env.gap.result import Conclusion, Diagnosis, Gap
+from spikecam_env.gap.result import Diagnosis, Gap
 from spikecam_env.gap.verdict.notes import Note
 
 
 def sentence_of(d: Diagnosis) -> str:
     """The sentence of what a diagnosis holds."""
-    held = vars(d) | {"notes": d.data}
-    return sentence(Conclusion(**{f.name: held[f.name] for f in fields(Conclusion)}), d.model_name)
+    return sentence(d, d.model_name)
 
 
 @pytest.mark.parametrize(
