@@ -3,7 +3,7 @@
     read -> audit -> refit -> twins -> alarm -> search -> gate -> verdict -> evidence -> bounds
 
 A campaign passes the rooms of this package in their order (docs/architecture.md).  Held-out recordings take no part in
-the search, but for what `search` says; the gate is on all, and the gap on them alone.
+the search, with the exceptions of `search`; the gate is on all, and the gap on them alone.
 """
 
 from __future__ import annotations
@@ -155,15 +155,15 @@ class DiagnosisRequest:
 def of_spikes(
     measured: Campaign, tested: SensorModel, request: DiagnosisRequest, templates: Templates | None, stages: Stages
 ) -> Findings:
-    """A campaign of spikes, from its files to what a diagnosis says of it: one room after another."""
+    """A campaign of spikes, from its files to the findings: one room after another."""
     with stages.timed("read"):
-        seen = observed(measured)
+        recordings = observed(measured)
     with stages.timed("motion"):
-        seen, motion = without_motion(seen, static_only=request.static_only, settings=request.settings)
-    if motion and not seen.recordings:
+        recordings, motion = without_motion(recordings, static_only=request.static_only, settings=request.settings)
+    if motion and not recordings.recordings:
         return findings_of(moves(tested, motion, static_only=request.static_only), [], motion=motion)
     with stages.timed("refit"):
-        case = case_of_observed(measured, seen, request.seed, request.jobs, request.settings)
+        case = case_of_observed(measured, recordings, request.seed, request.jobs, request.settings)
         notes = [*static_note(motion), *label_unit_note(case.nominal_per_label, case.base)]
     comparison = comparison_of(case, tested, request, stages)
     case, null, values = comparison.case, comparison.null, comparison.values
@@ -199,9 +199,16 @@ def of_spikes(
 
 
 def read_case(campaign: Campaign, seed: int = 0, jobs: int = 1, settings: DiagnosisSettings | None = None) -> Case:
-    """Observe and refit a campaign; recordings at another V_d than most, and rates only, are left to SNEE.
+    """Observe and refit a campaign.
 
-    Raises InputError where a recording of steady light moves, and for settings of another type.
+    Args:
+        campaign: recordings at another V_d than most, and rates only, are left to SNEE.
+        seed: of all simulations.
+        jobs: threads.
+        settings: default `DiagnosisSettings()`.
+
+    Raises:
+        InputError: where a recording of steady light moves, and for settings of another type.
     """
     settings = checked_settings(settings)
     seen, motion = without_motion(observed(campaign), static_only=False, settings=settings)
@@ -229,7 +236,7 @@ def observed(campaign: Campaign) -> Observed:
 
 
 def case_of_observed(campaign: Campaign, all_seen: Observed, seed: int, jobs: int, settings: DiagnosisSettings) -> Case:
-    """Refit the unit by what was observed; labels in another unit are counted anew."""
+    """Refit the unit by the recordings; labels in another unit are counted anew."""
     seen = all_seen.seen
     conditions = [
         replace(c, level=float(o.rate[looked_at(c)].mean())) if c.kind == "unknown" else c
@@ -251,8 +258,8 @@ def refittable(conditions: Sequence[Condition]) -> bool:
 
 
 def comparison_of(case: Case, tested: SensorModel, request: DiagnosisRequest, stages: Stages) -> Comparison:
-    """The case beside a model, without a search: labels that contradict, effects that the refit says are missing, what
-    is off nominal, and the null model's twins."""
+    """The case beside a model, without a search: contradictions of labels, effects that the refit shows to be missing,
+    parameters off nominal, and the null model's twins."""
     with stages.timed("audit"):
         contradictions = upheld(case, tested, audit(case))
         case = trimmed(case, contradictions)
@@ -291,7 +298,7 @@ def trimmed(case: Case, contradictions: Sequence[Contradiction]) -> Case:
 
 
 def templates_for(comparison: Comparison, progress: bool) -> Templates:
-    """Those of the standard design, or of scenes that nobody measured their own; the budget is for neither."""
+    """Templates of the standard design, or of unknown scenes alone their own; neither counts in the budget."""
     case = comparison.case
     if case.scenes_only:
         return own_templates(replace(case, budget=Budget()), comparison.model, comparison.null, comparison.names)

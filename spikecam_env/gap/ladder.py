@@ -1,8 +1,8 @@
 """The ladder: from a model that lacks nearly everything to one that leaves nothing, an effect a rung.
 
-What the free refit needed and the model has no effect for (`missing_from_refit`) is added one after another, each
-time the one that takes away most; then the search for effects goes on as in a diagnosis.  Every rung is judged on the
-same held-out statistics, in the noise of the last.
+Effects that the free refit shows and the model lacks (`missing_from_refit`) are added one after another, each time the
+one that takes away most; then the search for effects goes on as in a diagnosis.  Every rung is judged on the same
+held-out statistics, in the noise of the last.
 """
 
 from __future__ import annotations
@@ -46,30 +46,35 @@ LADDER_FORMAT = "spikecam-ladder/1"
 
 @dataclass(frozen=True)
 class Rung:
-    """A model on the way.  added: its newest effect, None for the first; sd: of its strength.
-
-    also: names that are tied with it.  gap: mean square of held-out statistics, in noise, 1 is
-    chance.  groups: the same of each group of statistics, over all recordings.  off: statistics of p < 0.05.
-    """
+    """A model on the way."""
 
     model: SensorModel
     added: Effect | None
+    """Its newest effect; None for the first rung."""
     sd: float
+    """Of its strength."""
     also: tuple[str, ...]
+    """Names that are tied with it."""
     gap: float
+    """Mean square of held-out statistics, in noise; 1 is chance."""
     groups: dict[str, float]
+    """The same of each group of statistics, over all recordings."""
     off: int
+    """Statistics of p < 0.05."""
 
 
 @dataclass(frozen=True)
 class Ladder:
-    """Rungs, first to last; statistics: how many every rung is judged by; notes: on the labels."""
+    """Models from simple to sufficient."""
 
     campaign: str
     seed: int
     statistics: int
+    """Number of statistics by which every rung is judged."""
     rungs: tuple[Rung, ...]
+    """First to last."""
     notes: tuple[str, ...] = ()
+    """On the labels."""
 
     def to_json(self) -> dict[str, Any]:
         """The documented format."""
@@ -144,22 +149,23 @@ def ladder(
 
 @dataclass(frozen=True)
 class RungStatistics:
-    """By what all rungs are judged: the statistics of a case, (S,) as measured, in the noise of the last model."""
+    """The statistics by which all rungs are judged, in the noise of the last model."""
 
     case: Case
     null: Null
     values: Floats
+    """(S,) as measured."""
 
-    def rung(self, model: SensorModel, mean: Floats, found: Missing | None) -> Rung:
-        """A model as a rung.  mean: (S,) what it predicts; found: its newest effect."""
+    def rung(self, model: SensorModel, mean: Floats, newest: Missing | None) -> Rung:
+        """A model as a rung, with its predictions (S,) and its newest effect."""
         square = np.nan_to_num((self.values - mean) / self.null.noise) ** 2
         group = np.array([k.group for k in self.null.keys])
         p = adjusted(np.sign(self.values - mean) * np.sqrt(square))
         return Rung(
             model,
-            found.effect if found else None,
-            found.sd if found else np.nan,
-            found.also if found else (),
+            newest.effect if newest else None,
+            newest.sd if newest else np.nan,
+            newest.also if newest else (),
             float(square[self.case.held_out(self.null.keys)].mean()),
             {g: float(square[group == g].mean()) for g in dict.fromkeys(group.tolist())},
             int((p < SIGNIFICANT).sum()),
@@ -167,12 +173,12 @@ class RungStatistics:
 
 
 def climbed(judge: RungStatistics, first: SensorModel, lacking: Sequence[Missing], progress: bool) -> list[Rung]:
-    """The first model, then what the refit found missing, one after another: each time the one that takes away most."""
+    """The first model, then effects that the refit shows, one after another: each time the one that takes away most."""
 
-    def simulated(model: SensorModel, found: Missing | None, *, last: bool) -> Rung:
-        few = judge.case.settings.twins.to_confirm  # the distance is large beside what these leave open
+    def simulated(model: SensorModel, newest: Missing | None, *, last: bool) -> Rung:
+        few = judge.case.settings.twins.to_confirm  # the distance is large beside their error
         mean = judge.null.mean if last else aligned_mean(model_null(judge.case, model, few), judge.null)
-        return judge.rung(model, mean, found)
+        return judge.rung(model, mean, newest)
 
     rungs = [simulated(first, None, last=not lacking)]
     left = list(lacking)

@@ -1,8 +1,11 @@
 """Labels: the light of recordings of a real camera, from code, a CSV table or the command line.
 
 0.2                 even, steady light of that radiance; 0 is dark
+
 unknown             a static scene of unknown light
+
 steps.npz           light over time, `frame` (K,) and `radiance` (K, H, W) or broadcastable, as in a campaign
+
 relative            (flat maps only) the unit itself is the light meter, see `real_files`
 """
 
@@ -34,30 +37,28 @@ _COLUMNS = ("file", "radiance", "name", "use", "v_d", "temperature_k", "note", *
 class Label:
     """One file of a real camera, its light and its conditions.
 
-    Args:
-        file: its path in the folder of the recordings.
-        radiance: of even, steady light, 1.0 makes the nominal pixel fire once a frame; or `unknown`, `relative`, or
-            an npz of light over time.
-        name: of the recording; default the file's.
-        use: `fit` or `holdout`.
-        v_d: V_D - V_ref [V].
-        temperature_k: [K].
-        note: free text.
-        reading: options of `read_recording` for this file.
-
     Example:
         >>> Label("screen.dat", 0.2, name="screen", reading={"flip": True}).use
         'fit'
     """
 
     file: str
+    """Its path in the folder of the recordings."""
     radiance: float | str
+    """Of even, steady light, 1.0 makes the nominal pixel fire once a frame; or `unknown`, `relative`, or an npz of
+    light over time."""
     name: str = ""
+    """Of the recording; default the file's."""
     use: str = "fit"
+    """`fit` or `holdout`."""
     v_d: float | None = None
+    """V_D - V_ref [V]."""
     temperature_k: float | None = None
+    """[K]."""
     note: str = ""
+    """Free text."""
     reading: Mapping[str, Any] = field(default_factory=dict)
+    """Options of `read_recording` for this file."""
 
 
 def labels_from_table(path: str | Path) -> tuple[Label, ...]:

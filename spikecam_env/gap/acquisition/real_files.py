@@ -80,8 +80,8 @@ def import_campaign(
         The campaign, as `read_campaign` reads it.
 
     Raises:
-        InputError: for no labels, missing files, files of another size or frame rate than the first, an unknown frame
-            rate, a part that is not in the picture, light of another size, and everything that the readers refuse.
+        InputError: for no labels, missing files, and files of another size or frame rate than the first; for an unknown
+            frame rate, a part that is not in the picture, and light of another size; as the readers.
 
     Example:
         >>> from pathlib import Path
@@ -96,9 +96,7 @@ def import_campaign(
     if not source.is_dir():
         raise InputError(f"there is no folder {source}; give the folder of the recordings")
     if not labels:
-        raise InputError(
-            f"no labels: say of each recording what it was shown, a number or `unknown`; {_listing(source)}"
-        )
+        raise InputError(f"no labels: give the light of each recording, a number or `unknown`; {_listing(source)}")
     if frame_rate_hz is not None:
         frame_rate_hz = checked_number(frame_rate_hz, "frame_rate_hz", *FRAME_RATES_HZ, unit="Hz")
     radiance_per_unit = checked_number(radiance_per_unit, "radiance_per_unit", *RADIANCES_PER_UNIT)
@@ -125,10 +123,11 @@ def import_campaign(
 
 @dataclass(frozen=True)
 class _Source:
-    """The folder of the recordings; outside: whether labels may name files beyond it."""
+    """The folder of the recordings."""
 
     folder: Path
     outside: bool
+    """Whether labels may name files beyond it."""
 
     def file(self, text: str, label: Label) -> Path:
         path = inside(self.folder, text, f"the label of {label.file!r}: file", outside=self.outside)
@@ -159,7 +158,7 @@ class _Part:
 
 @dataclass(frozen=True)
 class _Piece:
-    """A recording on its way into the campaign.  data: spikes (T, H, W), or rates (H, W) counted over `frames`."""
+    """A recording on its way into the campaign."""
 
     label: Label
     name: str
@@ -167,6 +166,7 @@ class _Piece:
     light: Keyframes | None
     frames: int
     data: NDArray[Any]
+    """Spikes (T, H, W), or rates (H, W) counted over `frames`."""
     frame_rate_hz: float | None = None
     note: str = ""
 

@@ -3,12 +3,12 @@
 `light(shape, frames)` is a pure function: keys that are linear between and whole frames apart, stored along the axes on
 which the light changes and no others.  Radiance 1.0 makes the nominal pixel fire once a frame.
 
-    dark            reveals dark current, its patterns and its noise
-    flat            rate curve, response patterns, noise of a spike, row and frame noise
-    step            lag, drift, history
-    bars            effects of place and time together: read-out skew, blur
-    disk            textures in motion before a static one, unlike all others: for judging
-    masked_rows     coupling along a row: pixels of the same light in rows of different load
+    dark            reveals dark current, its patterns and its noise;
+    flat            rate curve, response patterns, noise of a spike, row and frame noise;
+    step            lag, drift, history;
+    bars            effects of place and time together: read-out skew, blur;
+    disk            textures in motion before a static one, unlike all others: for judging;
+    masked_rows     coupling along a row: pixels of the same light in rows of different load.
 """
 
 from __future__ import annotations
@@ -29,18 +29,12 @@ MOTION_PER_KEY = 1.2
 """Most pixels of motion between two keys; beyond it light that is linear between keys no longer looks like motion."""
 
 SLOWEST = 1e-9
-"""Least speed of what moves [pixels/frame]: a pixel in 7 hours at 40 kHz."""
+"""Least speed of a motion [pixels/frame]: a pixel in 7 hours at 40 kHz."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Planned:
     """A recording to be made; its subclasses are the kinds of light.
-
-    Args:
-        name: of its files; empty: made from the kind and its level.
-        use: `fit`, or `holdout` for judging.
-        v_d: V_D - V_ref [V]; None: the model's own.
-        frames: length [frames]; None: the campaign's.
 
     Example:
         >>> planned = [Dark(), Flat(radiance=0.2, use="holdout"), Step(frames=4000)]
@@ -51,16 +45,24 @@ class Planned:
     kind: ClassVar[str]
 
     name: str = ""
+    """Of its files; empty: made from the kind and its level."""
     use: str = "fit"
+    """`fit`, or `holdout` for judging."""
     v_d: float | None = None
+    """V_D - V_ref [V]; None: the model's own."""
     frames: int | None = None
+    """Length [frames]; None: the campaign's."""
 
     def light(self, shape: tuple[int, int], frames: int) -> Keyframes:
         """Keys over frames [0, frames]; radiance is (K, H, W), or (K, 1, W), ... where it is even along an axis."""
         raise NotImplementedError
 
     def check(self) -> None:
-        """Raises InputError for a number that is not finite, or larger than any light is."""
+        """Check the numbers of the recording.
+
+        Raises:
+            InputError: for a number that is not finite, or larger than any light is.
+        """
         for f in fields(self):
             value = getattr(self, f.name)
             if isinstance(value, float):
@@ -96,9 +98,6 @@ class Dark(Planned):
 class Flat(Planned):
     """An evenly lit screen.
 
-    Args:
-        radiance: of the screen; 1.0 makes the nominal pixel fire once a frame.
-
     Example:
         >>> Flat(radiance=0.5).light((4, 6), frames=100).radiance.tolist()
         [[[0.5]]]
@@ -107,6 +106,7 @@ class Flat(Planned):
     kind = "flat"
 
     radiance: float
+    """Of the screen; 1.0 makes the nominal pixel fire once a frame."""
 
     def light(self, shape: tuple[int, int], frames: int) -> Keyframes:
         return _unchanging(np.full((1, 1), self.radiance))
@@ -121,10 +121,6 @@ class Step(Planned):
 
     An edge takes one frame: light goes from one level to the other between frames n - 1 and n, n = half_period, ...
 
-    Args:
-        low, high: radiance of the two levels.
-        half_period: between two edges [frames].
-
     Example:
         >>> light = Step(low=0.25, high=0.5, half_period=20).light((4, 6), frames=50)
         >>> list(zip(light.frame.tolist(), light.radiance[:, 0, 0].tolist()))
@@ -134,8 +130,11 @@ class Step(Planned):
     kind = "step"
 
     low: float = 0.05
+    """Radiance of one level."""
     high: float = 0.4
+    """Radiance of the other."""
     half_period: int = 200
+    """Between two edges [frames]."""
 
     def light(self, shape: tuple[int, int], frames: int) -> Keyframes:
         if self.half_period < 2:
@@ -154,12 +153,6 @@ class Bars(Planned):
     A pixel sees the mean light over its area.  While an edge crosses it, this is linear in time: keys at each pixel of
     motion are exact if 1/speed and period/2 are whole.
 
-    Args:
-        low, high: radiance of the dark and the bright half.
-        period: of the bars [pixels].
-        speed: of the motion [pixels/frame]; negative: to the left, or upward.
-        down: whether they move downward.
-
     Example:
         >>> light = Bars(low=0.0, high=1.0, period=4, speed=0.5).light((2, 4), frames=4)
         >>> light.frame.tolist(), light.radiance[:, 0].tolist()
@@ -169,10 +162,15 @@ class Bars(Planned):
     kind = "bars"
 
     low: float = 0.05
+    """Radiance of the dark half."""
     high: float = 0.4
+    """Radiance of the bright half."""
     period: float = 16.0
+    """Of the bars [pixels]."""
     speed: float = 0.2
+    """Of the motion [pixels/frame]; negative: to the left, or upward."""
     down: bool = False
+    """Whether they move downward."""
 
     def light(self, shape: tuple[int, int], frames: int) -> Keyframes:
         if not (self.speed == 0 or SLOWEST <= abs(self.speed) <= MOTION_PER_KEY) or not 2.0 <= self.period < np.inf:
@@ -197,11 +195,6 @@ class Bars(Planned):
 class Disk(Planned):
     """A textured disk that turns in front of a static pattern.
 
-    Args:
-        low, high: least and largest radiance.
-        rim_speed: of the texture at the rim [pixels/frame].
-        seed: of both textures.
-
     Example:
         >>> Disk(name="slow", rim_speed=0.01, use="holdout").file_name
         'slow'
@@ -210,9 +203,13 @@ class Disk(Planned):
     kind = "disk"
 
     low: float = 0.05
+    """Least radiance."""
     high: float = 0.5
+    """Largest radiance."""
     rim_speed: float = 0.04
+    """Of the texture at the rim [pixels/frame]."""
     seed: int = 0
+    """Of both textures."""
 
     def light(self, shape: tuple[int, int], frames: int) -> Keyframes:
         if not abs(self.rim_speed) <= MOTION_PER_KEY:
@@ -245,11 +242,6 @@ class MaskedRows(Planned):
 
     On the left the light is the same in all rows, while half of the rows carry half of the activity.
 
-    Args:
-        dark: radiance behind the mask.
-        bright: radiance elsewhere.
-        band: height of a band [rows].
-
     Example:
         >>> MaskedRows(dark=0.0, bright=0.5, band=1).light((2, 4), frames=100).radiance.tolist()
         [[[0.5, 0.5, 0.5, 0.5], [0.5, 0.5, 0.0, 0.0]]]
@@ -258,8 +250,11 @@ class MaskedRows(Planned):
     kind = "masked_rows"
 
     dark: float = 0.02
+    """Radiance behind the mask."""
     bright: float = 0.4
+    """Radiance elsewhere."""
     band: int = 8
+    """Height of a band [rows]."""
 
     def light(self, shape: tuple[int, int], frames: int) -> Keyframes:
         if not 1 <= self.band < shape[0]:

@@ -22,7 +22,10 @@ def is_discrepant(null: Null, values: Floats) -> bool:
 def with_held_out_motion(case: Case) -> Case:
     """The case with all recordings in motion to be fitted, the held-out ones too; the unit rests on none of these.
 
-    For a discrepancy that shows in held-out motion and in nothing else.  The case itself where no motion is held out.
+    It is for a discrepancy that shows in held-out motion and in nothing else.
+
+    Args:
+        case: stays as it is where no motion is held out.
     """
     if not any(c.moves and c.use == "holdout" for c in case.conditions):
         return case

@@ -1,4 +1,4 @@
-"""A contradiction: a mistake in the campaign itself, that no model has to explain."""
+"""A contradiction: a mistake in the campaign itself."""
 
 from __future__ import annotations
 
@@ -7,12 +7,12 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class Contradiction:
-    """kind: label, swapped, flipped, dropped or silent.  recordings: concerned; text: the finding, in words.
-
-    factor: what a label has to be multiplied by.
-    """
+    """A mistake that no model has to explain."""
 
     kind: str
+    """label, swapped, flipped, dropped or silent."""
     recordings: tuple[str, ...]
     text: str
+    """The finding, in words."""
     factor: float = 1.0
+    """Factor that a label lacks."""

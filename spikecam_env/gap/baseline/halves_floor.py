@@ -25,7 +25,15 @@ def floor_of_halves(case: Case, recordings: Sequence[CampaignRecording], null: N
 
     A statistic of n frames has a variance in 1/n, so the difference of two halves has four times the whole's.  Where
     halves do not show it, the variance is that of twins: in motion, where each half shows other places, and in the
-    pattern, which halves share and the gap compares with fresh units.  NaN where no steady recording is long enough.
+    pattern, which halves share and the gap compares with fresh units.
+
+    Args:
+        case: the measurement, refitted.
+        recordings: its files.
+        null: the null model.
+
+    Returns:
+        The floor; NaN where no steady recording is long enough.
     """
     held = case.held_out(null.keys)
     names = {k.recording for k, is_held in zip(null.keys, held, strict=True) if is_held}
@@ -41,8 +49,8 @@ def floor_of_halves(case: Case, recordings: Sequence[CampaignRecording], null: N
     second: dict[StatisticKey, float] = {}
     for c, r in steady:
         bits, half = r.packed(), c.frames // 2
-        for found, part in ((first, bits[:half]), (second, bits[half : 2 * half])):
-            found.update(_half_bank(case.base, replace(c, frames=half), observe(part, case.shape)))
+        for bank, part in ((first, bits[:half]), (second, bits[half : 2 * half])):
+            bank.update(_half_bank(case.base, replace(c, frames=half), observe(part, case.shape)))
     halves = (values_of(first, null.keys) - values_of(second, null.keys)) / 2.0
     twins2 = null.noise**2 - null.floor**2
     return float(np.mean((np.where(np.isfinite(halves), halves**2, twins2) / null.noise**2)[held]))

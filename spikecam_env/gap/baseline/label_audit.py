@@ -49,11 +49,11 @@ BELOW_SATURATION = 0.9
 
 def audit(case: Case) -> list[Contradiction]:
     """All contradictions, the grossest kind first; later checks skip recordings that are already suspect."""
-    found: list[Contradiction] = []
+    faults: list[Contradiction] = []
     for check in (silent, flipped, swapped, wrong_label, dropped):
-        suspect = {r for c in found for r in c.recordings}
-        found += [c for c in check(case, suspect) if not suspect & set(c.recordings)]
-    return found
+        suspect = {r for c in faults for r in c.recordings}
+        faults += [c for c in check(case, suspect) if not suspect & set(c.recordings)]
+    return faults
 
 
 def silent(case: Case, suspect: set[str]) -> list[Contradiction]:
@@ -132,7 +132,7 @@ def wrong_label(case: Case, suspect: set[str]) -> list[Contradiction]:
 
 
 def _wrong_flat(case: Case, name: str, names: Sequence[str], off: float, left: float) -> list[Contradiction]:
-    """A flat whose rate is `off` the line of the others, relative; left: how far these are off it at most.
+    """A flat whose rate is `off` the line of the others, which are off it by `left` at most; both relative.
 
     A label is one number and makes no interval irregular; an effect that begins at that level differs from pixel to
     pixel.
@@ -152,7 +152,7 @@ def _wrong_flat(case: Case, name: str, names: Sequence[str], off: float, left: f
 def _wrong_dark(case: Case, name: str, rate: float, dark: float, left: float) -> list[Contradiction]:
     """A recording labelled dark whose rate is above `dark`, the extrapolation of the others; none is darker than dark.
 
-    left: how far the others are off their line at most, of their lowest rate.
+    The others are off their line by `left` at most, of their lowest rate.
     """
     off = float(rate / max(dark, 1e-9) - 1)
     outstanding = UNDONE / (1 - UNDONE)
@@ -162,13 +162,21 @@ def _wrong_dark(case: Case, name: str, rate: float, dark: float, left: float) ->
     return [Contradiction("label", (name,), text)]
 
 
-def upheld(case: Case, model: SensorModel, found: Sequence[Contradiction]) -> list[Contradiction]:
-    """The contradictions that hold: the label of the brightest flat is at fault only where, relabelled, all else of its
-    recording agrees.  An effect that removes spikes in bright light alone looks like a wrong label of the brightest."""
+def upheld(case: Case, model: SensorModel, faults: Sequence[Contradiction]) -> list[Contradiction]:
+    """The contradictions that hold.
+
+    The label of the brightest flat is at fault only where, relabelled, all else of its recording agrees: an effect that
+    removes spikes in bright light alone looks like a wrong label of the brightest.
+
+    Args:
+        case: the measurement.
+        model: to be tested.
+        faults: contradictions.
+    """
     levels = {c.name: c.level for c in case.conditions if c.kind == "flat"}
     brightest = max(levels, key=lambda name: levels[name], default="")
     return [
-        c for c in found if c.kind != "label" or c.recordings != (brightest,) or agrees_when_relabelled(case, model, c)
+        c for c in faults if c.kind != "label" or c.recordings != (brightest,) or agrees_when_relabelled(case, model, c)
     ]
 
 

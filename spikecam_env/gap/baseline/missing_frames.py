@@ -23,7 +23,7 @@ LATE_SHARE = 0.3
 """Frames by which pixels are late after a gap, at least.  Of the delay in a gap, that of other frames is less."""
 
 AS_GOOD = 0.8
-"""Of what the best shift removes, what one removes that does as well."""
+"""Share that a shift as good removes of the misfit that the best one removes."""
 
 SEGMENTS = 8
 """Parts of a moving recording whose timing is compared."""

@@ -28,11 +28,12 @@ FIRED_SHARE = 0.3
 
 @dataclass(frozen=True)
 class Missing:
-    """An effect that is not in the model, and its size.  also: names of those that are the same at one V_d."""
+    """An effect that is not in the model, and its size."""
 
     effect: Effect
     sd: float
     also: tuple[str, ...] = ()
+    """Names of effects that are the same at one V_d."""
 
 
 def missing_effects(case: Case, model: SensorModel, names: Sequence[str]) -> list[Missing]:
@@ -116,9 +117,11 @@ def is_noise(case: Case, model: SensorModel) -> bool:
 
 
 def fires_in_the_dark(case: Case, level: float) -> bool:
-    """Whether the dark recordings hold a large share of the spikes that a dark level [thresholds/frame] would give.
+    """Whether the dark recordings hold a large share of the spikes that a dark level would give.
 
-    Phases are uniform, so `level` a frame is to be expected of every pixel; without a dark recording: True.
+    Args:
+        case: the measurement; True without a dark recording.
+        level: of every pixel, as phases are uniform [thresholds/frame].
     """
     dark = [o for c, o in zip(case.conditions, case.observations, strict=True) if c.kind == "dark"]
     expected = sum(level * o.frames * o.times.count.size for o in dark)

@@ -1,18 +1,18 @@
-"""Motion in a recording that is said to be static: regions whose pixels change together, beyond what all pixels do.
+"""Motion in a recording that is said to be static: regions whose pixels change together, beyond the change of all.
 
     z = sum (c - e) / sqrt(sum v),   v = k (f (1 - f) + noise)        c: a pixel's count in a block of frames
 
 f is the fractional part of the expected count e: an integrator that carries its charge over fires a whole number of
-times, and where it begins is uniform (DESIGN: variance 1/6 on average, 1/4 at most; not Poisson's e).  e is the
-pixel's mean times what its level does in that block (`common_mode`): lamp drift, flicker and ripple are in all pixels,
-dark-current drift in all by their dark level, so neither is motion.  A single pixel counts three standard deviations at
-most, so a hot pixel is none either.  k is by how much neighbours of a level scatter about each other beyond that law
-(`excess`): single events, false or missed spikes and telegraph noise, are each pixel's own; what moves, neighbours
-share.  Events that pixels of a row share, as a glitch of the read-out is, make rows scatter more from block to block
-than columns, which motion does not, and windows with them (`shared_variance`).  Rows are no regions: windows are as
-high as wide, and even, in which what alternates from row to row cancels.
+times from a uniform phase (variance 1/6 on average, 1/4 at most; not Poisson's e).  e is the pixel's mean times the
+course of its level in that block (`common_mode`): lamp drift, flicker and ripple are in all pixels, dark-current drift
+in all by their dark level, so neither is motion.  A single pixel counts three standard deviations at most, so a hot
+pixel is none either.  k is the scatter of neighbours of a level about each other over that law (`excess`): single
+events, false or missed spikes and telegraph noise, are each pixel's own; motion is shared by neighbours.  Events that
+pixels of a row share, such as a glitch of the read-out, make rows scatter more from block to block than columns, and
+windows with them (`shared_variance`); motion does not.  Rows are no regions: windows are as high as wide, and even, so
+that changes of sign from row to row cancel.
 
-Blind to: what changes in all pixels of a level by the same share, regions smaller than the least of SIDES, and contrast
+Blind to: changes of all pixels of a level by the same share, regions smaller than the least of SIDES, and contrast
 below `least_contrast`, which local effects of a camera reach; slow noise of single pixels (1/f) is below it in the mean
 of a window.
 """
@@ -33,7 +33,7 @@ from spikecam_env.gap.settings import Baseline, DiagnosisSettings, checked_setti
 from spikecam_env.types import Floats, Masks
 
 SIDES = (4, 8, 16)
-"""Sides of the windows [pixels]: what is smaller is not found, what is larger in several."""
+"""Sides of the windows [pixels]: smaller motion is missed, larger is in several."""
 
 SPANS = (1, 4, 8)
 """Lengths of the windows [sixteenths of a recording]."""
@@ -55,7 +55,7 @@ FEW_SPIKES = 2.0
 have one or two are the mean."""
 
 _ROUNDS = 20
-"""Times at most that a recording is looked at again without what moved."""
+"""Times at most that a recording is searched again without the windows that moved."""
 
 _TRIMS = 4
 """Times that a common mode is fitted anew without the pixels that are off it."""
@@ -67,22 +67,25 @@ LEAST_COUNTS = 20.0
 
 @dataclass(frozen=True)
 class DetectedMotion:
-    """What moves in a recording.
-
-    moving: (H, W) bool.  rows, columns: first and last of the largest connected region.  frames: first and last in
-    which it differs most.  rate: (H, W) of the recording [spikes/frame].  light_known: by its label.
-    contrast: largest relative change of a window, of either sign; z: largest deviate.
-    """
+    """The moving part of a recording."""
 
     recording: str
     moving: Masks
+    """(H, W)."""
     rows: tuple[int, int]
+    """First and last of the largest connected region."""
     columns: tuple[int, int]
+    """First and last of the same."""
     frames: tuple[int, int]
+    """First and last in which it differs most."""
     contrast: float
+    """Largest relative change of a window, of either sign."""
     z: float
+    """Largest deviate."""
     rate: Floats
+    """(H, W) of the recording [spikes/frame]."""
     light_known: bool = False
+    """Whether the label says the light."""
 
     @property
     def share(self) -> float:
@@ -107,23 +110,31 @@ class DetectedMotion:
 def find_motion(
     condition: Condition, seen: ObservedRecording, settings: DiagnosisSettings | None = None
 ) -> DetectedMotion | None:
-    """What moves in a recording of steady light; None where nothing does, or the light is known to change.
+    """The moving part of a recording of steady light.
 
-    In the dark nothing is shown that could move; what changes there is the camera.
+    In the dark nothing can move; changes there are the camera's.
+
+    Args:
+        condition: of the recording.
+        seen: the recording.
+        settings: limits; None: the defaults.
+
+    Returns:
+        None where nothing moves, or the light is known to change.
     """
     if condition.kind not in STEADY or condition.kind == "dark":
         return None
     limits = checked_settings(settings).baseline
     counts, frames = whole_blocks(seen)
     kept = np.ones(seen.shape, bool) if condition.static is None else condition.static
-    found: list[_Window] = []
+    windows: list[_Window] = []
     for _ in range(_ROUNDS):
         more = list(_moving_windows(counts, seen.shape, kept, limits))
         if not more:
             break
-        found += more
+        windows += more
         kept = kept & ~_union(more, seen.shape)
-    return _described(condition, found, seen, frames) if found else None
+    return _described(condition, windows, seen, frames) if windows else None
 
 
 def whole_blocks(seen: ObservedRecording) -> tuple[Floats, int]:
@@ -139,8 +150,15 @@ def expected_variance(expected: Floats) -> Floats:
 
 
 def common_mode(counts: Floats, mean: Floats, use: Masks) -> Floats:
-    """(P,) counts that the level `mean` of a pixel lets expect in a block: the parabola through all pixels in `use`,
-    fitted without those off it, since what moves is not common; one by less than FEW_SPIKES is not off."""
+    """(P,) expected counts of a block, by the level of each pixel.
+
+    They are the parabola through all pixels, fitted without those off it by FEW_SPIKES or more: motion is not common.
+
+    Args:
+        counts: (P,) of the block.
+        mean: (P,) over blocks.
+        use: (P,) pixels that count.
+    """
     level = mean / max(float(mean[use].mean()), 1e-9)
     design = np.stack([np.ones_like(level), level, level**2], axis=1)
     expected, inside = mean, use
@@ -158,15 +176,18 @@ def common_mode(counts: Floats, mean: Floats, use: Masks) -> Floats:
 
 
 def of_one_level(level: Floats, kept: Masks) -> list[NDArray[np.intp]]:
-    """Flat indices of the pixels kept, of neighbouring levels together.  level: (P,) mean count."""
+    """Flat indices of the pixels kept, of neighbouring levels (mean counts, (P,)) together."""
     order = np.flatnonzero(kept)[np.argsort(level[kept.reshape(-1)], kind="stable")]
     return np.array_split(order, max(order.size // PIXELS_OF_A_LEVEL, 1))
 
 
 def excess(deviates: Floats, kept: Masks, groups: list[NDArray[np.intp]]) -> Floats:
-    """(P,) by how much more than 1 the deviates of neighbours scatter about each other, in each group; 1 at least.
+    """(P,) variance of the deviates of neighbours about each other, in each group; 1 at least.
 
-    deviates: (n, H, W), of n parts of the time, each pixel's in its own standard deviations.
+    Args:
+        deviates: (n, H, W) of n parts of the time, each pixel's in its own standard deviations.
+        kept: (H, W) pixels that count.
+        groups: of pixels, flat indices.
     """
     half, pairs = np.zeros(kept.shape), np.zeros(kept.shape)
     by_rows, by_columns = (deviates, kept, half, pairs), (deviates.swapaxes(1, 2), kept.T, half.T, pairs.T)
@@ -183,8 +204,8 @@ def excess(deviates: Floats, kept: Masks, groups: list[NDArray[np.intp]]) -> Flo
 
 
 def without_bias(deviates: Floats, groups: list[NDArray[np.intp]]) -> Floats:
-    """Deviates (n, P) whose mean over each group and all parts of the time is 0: those of few spikes are skewed, so
-    that a limit to what a pixel counts moves their mean."""
+    """Deviates (n, P) whose mean over each group and all parts of the time is 0: those of few spikes are skewed, and
+    the limit of a pixel's deviate moves their mean."""
     centred = deviates.copy()
     for group in groups:
         centred[:, group] -= deviates[:, group].mean()
@@ -231,12 +252,12 @@ def _deviations(
     """(n, H, W) of n parts of the time of `span` blocks: spikes off, off as far as a pixel counts, their variance, and
     spikes expected; 0 where not `kept`."""
     firsts = range(0, len(counts) - span + 1, span)
-    hoped = np.stack([expected[first : first + span].sum(axis=0) for first in firsts])
-    off = np.stack([counts[first : first + span].sum(axis=0) for first in firsts]) - hoped
-    sd = np.sqrt(expected_variance(hoped))
+    sums = np.stack([expected[first : first + span].sum(axis=0) for first in firsts])
+    off = np.stack([counts[first : first + span].sum(axis=0) for first in firsts]) - sums
+    sd = np.sqrt(expected_variance(sums))
     deviates = without_bias(np.clip(off / sd, -MOST_OF_A_PIXEL, MOST_OF_A_PIXEL), groups)
     scatter = excess(deviates.reshape(-1, *kept.shape), kept, groups)
-    parts = (off, deviates * sd, scatter * sd**2, hoped)
+    parts = (off, deviates * sd, scatter * sd**2, sums)
     return tuple(np.where(kept, part.reshape(-1, *kept.shape), 0.0) for part in parts)
 
 
@@ -248,11 +269,19 @@ def least_deviate(tests: int, limits: Baseline) -> float:
 def beyond(
     planes: tuple[Floats, ...], size: tuple[int, int], span: int, shared: float, least_z: float, limits: Baseline
 ) -> Iterator[_Window]:
-    """Windows of one size in parts of the time of `span` blocks.  planes: `_deviations`.  shared: variance of a pixel's
-    count that is of events which pixels of a row share, times those that share one.
+    """Windows of one size that move.
 
     Few events that pixels share are no normal deviates.  Their chance is bounded by Bernstein's inequality,
-    exp(-d^2 / (2 v + 2 m d / 3)) of a deviation d in steps of m spikes; m is by how much they multiply the variance.
+    exp(-d^2 / (2 v + 2 m d / 3)) of a deviation d in steps of m spikes; m is the factor by which they multiply the
+    variance.
+
+    Args:
+        planes: `_deviations` of parts of the time.
+        size: of the windows (rows, columns).
+        span: length of a part [blocks].
+        shared: variance of a pixel's count by events that pixels of a row share, times those that share one.
+        least_z: of a window that moves.
+        limits: of its contrast.
     """
     rows, columns = (_starts(n, side) for n, side in zip(planes[0].shape[1:], size, strict=True))
     off, capped, variance, expected = (_window_sums(plane, rows, columns, size) for plane in planes)
@@ -266,18 +295,20 @@ def beyond(
 
 
 def shared_variance(planes: tuple[Floats, ...], width: int) -> float:
-    """Variance of a pixel's count in a block, beside its own, in windows of a width [pixels]: of events that pixels of
-    a row share, times those that share one, `width` at most.
+    """Variance of a pixel's count in a block by events that pixels of a row share, times those that share one.
 
-    From block to block, parts of rows scatter more by it than parts of columns; what moves is shared along both, or
-    slow.  planes: `_deviations` of single blocks.
+    From block to block, parts of rows scatter more by it than parts of columns; motion is shared along both, or slow.
+
+    Args:
+        planes: `_deviations` of single blocks.
+        width: of windows [pixels]; no more pixels share an event.
     """
     along_rows, along_columns = (_scatter_of_strips(planes, size) for size in ((1, width), (width, 1)))
     return float(np.clip(along_rows - along_columns, 0.0, width - 1.0)) * _own_variance(planes)
 
 
 def _own_variance(planes: tuple[Floats, ...]) -> float:
-    """Mean variance of a pixel's count, of pixels that are looked at."""
+    """Mean variance of a pixel's count, of pixels that count."""
     variance = planes[2][planes[2] > 0]
     return float(variance.mean()) if variance.size else 0.0
 
@@ -312,13 +343,13 @@ def _union(windows: list[_Window], shape: tuple[int, int]) -> Masks:
     return moving
 
 
-def _described(condition: Condition, found: list[_Window], seen: ObservedRecording, frames: int) -> DetectedMotion:
+def _described(condition: Condition, windows: list[_Window], seen: ObservedRecording, frames: int) -> DetectedMotion:
     """The largest connected region, and when its windows are off."""
-    moving = _union(found, seen.shape)
+    moving = _union(windows, seen.shape)
     regions, _ = scipy.ndimage.label(moving)
     largest = int(np.argmax(np.bincount(regions.ravel())[1:])) + 1
     row, column = np.nonzero(regions == largest)
-    mine = [w for w in found if regions[w.row, w.column] == largest]
+    mine = [w for w in windows if regions[w.row, w.column] == largest]
     worst = max(mine, key=lambda w: abs(w.z))
     shortest = min(w.blocks[1] - w.blocks[0] for w in mine)
     when = [w.blocks for w in mine if w.blocks[1] - w.blocks[0] == shortest]

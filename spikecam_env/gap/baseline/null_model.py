@@ -1,4 +1,4 @@
-"""The null model: what a model predicts for a case, by twins of its unit, and by drawn units for the pattern."""
+"""The null model: a model's prediction for a case, by twins of its unit, and by drawn units for the pattern."""
 
 from __future__ import annotations
 
@@ -20,8 +20,15 @@ from spikecam_env.types import Floats
 
 
 def model_null(case: Case, model: SensorModel, count: int) -> Null:
-    """The prediction of `count` twins, and of twice as many for recordings in motion: each of their statistics is of
-    one recording alone, so that no other one pools its variance (`pooled_variance`)."""
+    """The prediction of `count` twins, and of twice as many for recordings in motion.
+
+    A statistic in motion is of one recording alone, so that no other one pools its variance (`pooled_variance`).
+
+    Args:
+        case: the measurement.
+        model: its effects.
+        count: number of twins.
+    """
     base, units = unit_under(case, model), case.settings.twins.drawn_units
     limits = case.settings.unit.spread_limits
     drawn = drawn_banks(model, case.base, case.conditions, case.shape, units, case.seed, limits)

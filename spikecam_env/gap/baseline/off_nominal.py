@@ -11,8 +11,7 @@ from numpy.typing import NDArray
 from spikecam_env.gap.candidates.strength import bounded, with_effect
 from spikecam_env.gap.twins.case import Case
 from spikecam_env.gap.twins.fresh_units import SPREAD_PARAMETERS, spread_factor, width
-from spikecam_env.gap.unit.refit import NOISE, BaseFit
-from spikecam_env.gap.unit.usual import unusual
+from spikecam_env.gap.unit.refit import NOISE, BaseFit, unusual
 from spikecam_env.sensor import CATALOGUE, SensorModel
 from spikecam_env.types import Floats
 
@@ -23,19 +22,22 @@ USUAL_NOISE = 1.5
 
 @dataclass(frozen=True)
 class OffNominal:
-    """Parameters off nominal: {effect: {measured, nominal, ratio}}, each effect's strength in its own unit.
-
-    nominal: the measured unit with those parameters as the model has them.
-    """
+    """Parameters off nominal."""
 
     parameters: dict[str, dict[str, float]]
+    """{effect: {measured, nominal, ratio}}, each effect's strength in its own unit."""
     nominal: BaseFit
+    """The measured unit with those parameters as the model has them."""
 
 
 def off_nominal(case: Case, model: SensorModel, base: BaseFit) -> OffNominal:
-    """Strengths of the model's effects that are beyond the spread of units (`unit.usual`) in the unit `base`.
+    """Strengths of the model's effects that are beyond the spread of units (`unit.usual`) in a unit.
 
-    Not of scenes alone: in recordings so short the refit of jitter is a fifth too small (`null_model.model_null`).
+    Args:
+        case: the measurement; nothing is off in scenes alone, whose recordings are so short that the refit of jitter is
+            a fifth too small (`null_model.unit_under`).
+        model: whose parameters are nominal.
+        base: the unit.
     """
     if case.scenes_only:
         return OffNominal({}, base)
@@ -55,13 +57,13 @@ def off_nominal(case: Case, model: SensorModel, base: BaseFit) -> OffNominal:
     level = level_off(base.dark[live], unit.dark)
     if "dark_current" in has and unusual(level, usual_spread):
         ratios["dark_current"] = level
-    for what, usual in (("gain", 1.0), ("dark", level)):
-        spreads = has.keys() & SPREAD_PARAMETERS[what].keys()
-        values = getattr(base, what)
-        if spreads and unusual(width(values[live]) / max(width(getattr(unit, what)), 1e-12), usual_spread):
-            factor = spread_factor(model, what, width(values[live]), shape, 0)
-            ratios |= {name: factor * usual for name in has if name in spreads}
-            base = replace(base, **{what: narrowed(values, live, factor)})  # type: ignore[arg-type]
+    for part, factor_of_level in (("gain", 1.0), ("dark", level)):
+        spreads = has.keys() & SPREAD_PARAMETERS[part].keys()
+        values = getattr(base, part)
+        if spreads and unusual(width(values[live]) / max(width(getattr(unit, part)), 1e-12), usual_spread):
+            factor = spread_factor(model, part, width(values[live]), shape, 0)
+            ratios |= {name: factor * factor_of_level for name in has if name in spreads}
+            base = replace(base, **{part: narrowed(values, live, factor)})  # type: ignore[arg-type]
     if "dark_current" in ratios:
         base = replace(base, dark=base.dark / level)
     rows = {n: {"measured": has[n] * r, "nominal": has[n], "ratio": r} for n, r in ratios.items() if n in has}
@@ -72,6 +74,10 @@ def level_off(values: Floats, nominal: Floats) -> float:
     """Ratio of two levels over pixels: of their medians or of their means, whichever is nearer to 1; 1 between both.
 
     Two distributions of another form, as of dark currents with a tail, differ by one of these and are of one level.
+
+    Args:
+        values: (P,) of a unit.
+        nominal: (P,) of the model.
     """
     ratios = [float(of(values)) / max(float(of(nominal)), 1e-12) for of in (np.median, np.mean)]
     low, high = min(ratios), max(ratios)

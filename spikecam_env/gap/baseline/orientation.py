@@ -23,7 +23,7 @@ LEAST_CORRELATION = 0.2
 """Correlation with its light of a recording that was turned, once corrected."""
 
 GAIN = 0.5
-"""Of what the correlation lacks to 1, what a turn gains."""
+"""Share of the correlation's lack to 1 that a turn gains."""
 
 
 def flipped(case: Case, suspect: set[str]) -> list[Contradiction]:
@@ -40,7 +40,7 @@ def flipped(case: Case, suspect: set[str]) -> list[Contradiction]:
 
 
 def _seen_and_expected(case: Case, i: int) -> tuple[Floats, Floats] | None:
-    """(n, H, W) of recording i: its film and that of the refitted unit, or its rates and those of the other flats."""
+    """(film, film of the refitted unit) of a recording, (n, H, W) each, or (rates, rates of the other flats)."""
     c, o = case.conditions[i], case.observations[i]
     if c.light is None or o.times.count.sum() < LEAST_SPIKES:
         return None

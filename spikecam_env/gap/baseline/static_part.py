@@ -1,4 +1,4 @@
-"""What of a campaign stands still: recordings without the pixels of unknown scenes that move."""
+"""The static part of a campaign: recordings without the pixels of unknown scenes that move."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ ENOUGH_STATIC = 0.3
 
 @dataclass(frozen=True)
 class Observed:
-    """Recordings of spikes at one V_d, their conditions, and what was seen in them; all empty where none is usable."""
+    """Recordings of spikes at one V_d, their conditions and observations; all empty where none is usable."""
 
     recordings: tuple[CampaignRecording, ...]
     conditions: tuple[Condition, ...]
@@ -29,10 +29,18 @@ class Observed:
 def without_motion(
     observed: Observed, *, static_only: bool, settings: DiagnosisSettings
 ) -> tuple[Observed, tuple[DetectedMotion, ...]]:
-    """What was observed without what moves, and what moves.
+    """The recordings without moving pixels, and the motion.
 
-    Without recordings where that cannot be left out: it is not to be (`static_only`), light said to be known changes,
-    or too few pixels are static.  All unknown scenes keep the same pixels.
+    All unknown scenes keep the same pixels.
+
+    Args:
+        observed: the recordings.
+        static_only: whether moving pixels may be left out.
+        settings: limits of motion.
+
+    Returns:
+        (recordings, motion).  There are no recordings where motion cannot be left out: without `static_only`, where
+        light said to be known changes, or where too few pixels are static.
     """
     both = zip(observed.conditions, observed.seen, strict=True)
     motion = tuple(m for c, o in both if (m := find_motion(c, o, settings)))
@@ -56,5 +64,5 @@ def static_pixels(motion: tuple[DetectedMotion, ...]) -> NDArray[np.bool_]:
 
 
 def looked_at(condition: Condition) -> NDArray[np.bool_] | slice:
-    """Index of the pixels of a recording that are looked at, of (P,)."""
+    """Index of the pixels of a recording that count, of (P,)."""
     return slice(None) if condition.static is None else condition.static.reshape(-1)

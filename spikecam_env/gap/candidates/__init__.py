@@ -1,1 +1,1 @@
-"""Effects that may be missing: what is known of each, and its place in a model."""
+"""Effects that may be missing: their properties, and their place in a model."""

@@ -25,7 +25,7 @@ def with_effect(model: SensorModel, name: str, parameters: Mapping[str, float]) 
 
 
 def bounded(name: str, parameters: Mapping[str, float]) -> dict[str, float]:
-    """Parameters within what their effect allows, whole where they must be; what is true or false stays so."""
+    """Parameters within the bounds of their effect, whole where they must be; booleans and texts stay."""
     out: dict[str, float] = {}
     for key, f in CATALOGUE[name].__dataclass_fields__.items():
         if key not in parameters:
@@ -40,10 +40,19 @@ def bounded(name: str, parameters: Mapping[str, float]) -> dict[str, float]:
 
 
 def amplified(name: str, parameters: Mapping[str, float], size: float) -> tuple[dict[str, float], float]:
-    """(parameters, times as much) of an effect that shows by `size` noises: a weak one is amplified to the target size.
+    """A weak effect at a strength that shows by the target size.
 
-    Scaled down again, what twins scatter by chance is scaled with it: four times as strong is as good as sixteen times
-    as many twins."""
+    Scaled down again, the scatter of twins is scaled with it: four times as strong is as good as sixteen times as many
+    twins.
+
+    Args:
+        name: of the effect.
+        parameters: at which it shows by `size`.
+        size: in noises.
+
+    Returns:
+        (parameters, times as strong).
+    """
     strength = candidate(name).strength
     linear = candidate(name).is_linear and parameters[strength] != 0
     times = float(np.clip(TARGET_SIZE / max(size, 1e-9), 1.0, MOST_EXTRAPOLATED)) if linear else 1.0

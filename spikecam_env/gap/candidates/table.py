@@ -1,4 +1,4 @@
-"""The candidates: every effect of the catalogue, read from its own `identification`; and what recordings show which."""
+"""The candidates: every effect of the catalogue, by its own `identification`, and the recordings that show it."""
 
 from __future__ import annotations
 
@@ -14,15 +14,13 @@ from spikecam_env.sensor import CATALOGUE, Effect, SensorModel
 from spikecam_env.sensor.effects.identification import Identification, Needs
 
 BENDING = ("saturation", "reset")
-"""Families of what bends the rate curve."""
+"""Families of effects that bend the rate curve."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Candidate(Identification):
-    """An effect as a diagnosis knows it: what it declares (`Identification`), and what follows from that.
-
-    fitted: parameters, the strength first; never empty.
-    """
+    """An effect in a diagnosis: its own declaration (`Identification`), with the strength first among `fitted`, and the
+    properties that follow from that."""
 
     name: str
 
@@ -56,7 +54,7 @@ class Candidate(Identification):
 
     @property
     def of_motion(self) -> bool:
-        """Whether it shows by contrast or change alone, so that how depends on the very picture."""
+        """Whether it shows by contrast or change alone, so that its statistics depend on the very picture."""
         return self.needs in (Needs.MOTION, Needs.EDGES, Needs.BRIGHT)
 
     @property
@@ -120,31 +118,31 @@ LACKING: dict[Needs, Callable[[Sequence[Condition]], str | None]] = {
     Needs.STEADY: _steady,
     Needs.EVEN: _even,
 }
-"""What recordings are lacking of those that an effect needs, in words; None where they are there."""
+"""The recordings that an effect needs and a campaign lacks, in words; None where it has them."""
 
 NOISE_OF_A_RESET = ("reset_noise", "excess_threshold_noise", "shot_noise")
-"""White noise of a spike: one number, s^2, whatever it is called; a second V_d splits it."""
+"""White noise of a spike: one number, s^2, by several names; a second V_d splits it."""
 
 
 def candidate(name: str) -> Candidate:
-    """What is known of an effect of the catalogue."""
+    """The candidate by its name in the catalogue."""
     return Candidate.of(CATALOGUE[name])
 
 
 @dataclass(frozen=True)
 class Candidates:
-    """Several effects at once, asked for what all or any of them are."""
+    """Several effects at once, with properties that all or any of them have."""
 
     names: tuple[str, ...]
 
     @property
     def each(self) -> tuple[Candidate, ...]:
-        """What is known of each."""
+        """One by one."""
         return tuple(candidate(name) for name in self.names)
 
     @property
     def any_pattern(self) -> bool:
-        """Whether drawn units are to say what one of them does."""
+        """Whether one of them changes the fixed pattern alone, so that units have to be drawn."""
         return any(c.is_pattern for c in self.each)
 
     @property
@@ -161,8 +159,8 @@ class Candidates:
 def expected_events(
     name: str, parameters: Mapping[str, float], shown: Sequence[Condition], seen: Sequence[ObservedRecording]
 ) -> float:
-    """Pixels, spikes or frames of pixels that an effect is expected to change in the steady recordings to fit of a
-    campaign; infinite where it is no share of such."""
+    """Pixels, spikes or frames of pixels that an effect changes in the steady recordings to fit of a campaign, by
+    expectation; infinite where it is no share of such."""
     share = candidate(name).share
     if share is None:
         return math.inf
@@ -174,8 +172,11 @@ def expected_events(
 
 
 def chosen(model: SensorModel, only: Sequence[str] | None, exclude: Sequence[str]) -> list[str]:
-    """Names to try: the catalogue, or `only`, less the model's effects, less `exclude`; raises InputError for unknown
-    names, and for one that is given twice in a list."""
+    """Names to try: the catalogue, or `only`, less the model's effects, less `exclude`.
+
+    Raises:
+        InputError: for an unknown name, and for one that is given twice in a list.
+    """
     for name in (*(only or ()), *exclude):
         if name not in CATALOGUE:
             raise unknown_name("candidate", name, CATALOGUE)
@@ -186,8 +187,8 @@ def chosen(model: SensorModel, only: Sequence[str] | None, exclude: Sequence[str
 
 
 def testable(names: Sequence[str], shown: Sequence[Condition]) -> tuple[list[str], list[tuple[str, str]]]:
-    """Candidates that these recordings can reveal, and the others with what each would need; those that act through one
-    that they can reveal are among the first."""
+    """(candidates that these recordings can reveal, with those that act through one of them; (name, need) of the
+    others)."""
     lacks = {n: LACKING[candidate(n).needs](shown) for n in names}
     reveals = {n for n, why in lacks.items() if why is None}
     reveals |= {n for n in names if reveals & {*candidate(n).acts_through}}

@@ -1,1 +1,1 @@
-"""Measurement against prediction: what a model gives, how far off the measurement is, and which step comes nearer."""
+"""Measurement against prediction: the distance between them, and the step that comes nearer."""

@@ -45,7 +45,13 @@ def normal_deviates(null: Null, t: Floats, predicted: Prediction | None = None) 
     """(S,) normal deviates of distances in noise, of a prediction or of the null model.
 
     The noise is estimated from few twins, and has more degrees of freedom where part of it is floor.  A distance that n
-    drawn units do not show counts as no rarer than 1 in n."""
+    drawn units do not show counts as no rarer than 1 in n.
+
+    Args:
+        null: the null model.
+        t: (S,) distances in noise.
+        predicted: that they are of; None: the null model.
+    """
     known, freedom = null.sd**2 * (1.0 + 1.0 / null.twins), null.freedom
     if predicted is not None:
         known, freedom = predicted.spread**2 + predicted.error**2, freedom_of(null, predicted)
@@ -59,9 +65,12 @@ def normal_deviates(null: Null, t: Floats, predicted: Prediction | None = None) 
 
 def share_beyond(t: Floats, apart: Floats) -> Floats:
     """(S,) share of drawn units, half at most, that lie as far to the same side as a distance; 0 where none does.
-    apart: (U, S) their own distances, NaN where they show nothing.
 
     Outliers of a row pattern come by whole rows: one unit in a hundred has some, which no t distribution describes.
+
+    Args:
+        t: (S,) distances in noise.
+        apart: (U, S) those of units, NaN where they show nothing.
     """
     beyond = np.sum(np.sign(t) * apart >= np.abs(t), axis=0)
     return np.where(beyond > 0, np.minimum((beyond + 1) / (len(apart) + 1), 0.5), 0.0)
@@ -72,6 +81,10 @@ def freedom_of(null: Null, predicted: Prediction) -> Floats:
 
     The null's part has the null's freedom; the excess of the effect's twins has that of few twins, `half_pooled`, or of
     the drawn units.  The excess is pooled over a group: a statistic with a small one by chance gains no freedom.
+
+    Args:
+        null: the null model.
+        predicted: whose spread it is.
     """
     beyond = np.maximum(predicted.spread / np.maximum(null.sd, 1e-300), 1.0) ** 2 - 1.0
     groups = np.unique([k.group for k in null.keys], return_inverse=True)[1]

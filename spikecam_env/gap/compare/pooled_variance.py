@@ -1,8 +1,8 @@
 """Moderated variances: a variance from few twins is combined with those of similar statistics.
 
 Empirical Bayes as in Smyth, "Linear models and empirical Bayes methods for assessing differential expression in
-microarray experiments", 2004, but for logarithms: those of one kind are normal about the kind's own, and how closely
-is read off their scatter beyond chance.
+microarray experiments", 2004, but for logarithms: those of one kind are normal about the kind's own, as closely as
+their scatter beyond chance shows.
 """
 
 from __future__ import annotations
@@ -24,11 +24,19 @@ MOST_FREEDOM = 2000.0
 
 
 def moderated(keys: Sequence[StatisticKey], variances: Floats, freedom: float) -> tuple[Floats, Floats]:
-    """((S,) variances, (S,) degrees of freedom) from (S,) sample variances with `freedom` each.
+    """Variances drawn to those of their kind.
 
-    A statistic's kind is the same one of all recordings; how closely a kind's variances agree is estimated from all
-    kinds that share a floor (`floor_family`), or, where that says more, but for what a recording has in common:
-    some have more spikes to count than others.  What never varied, or is of one recording alone, stays as it is.
+    A kind is the same statistic of all recordings.  The agreement within kinds is estimated from all kinds that share a
+    floor (`floor_family`), with or without a factor for each recording, as some have more spikes than others.  A
+    variance of 0, or of one recording alone, stays.
+
+    Args:
+        keys: (S,) statistics.
+        variances: (S,) sample variances.
+        freedom: degrees of freedom of each.
+
+    Returns:
+        ((S,) variances, (S,) degrees of freedom).
     """
     out, degrees = variances.copy(), np.full(len(keys), float(freedom))
     several = Counter((k.group, k.name) for k, v in zip(keys, variances, strict=True) if v > 0)
@@ -40,8 +48,8 @@ def moderated(keys: Sequence[StatisticKey], variances: Floats, freedom: float) -
     chance = float(scipy.special.polygamma(1, freedom / 2))
     for of in families.values():
         kinds, recordings = one_of_each([keys[i].name for i in of]), one_of_each([keys[i].recording for i in of])
-        found = [shrunk(logs[of], like, chance) for like in (kinds, np.hstack([kinds, recordings]))]
-        joint, error = min(found, key=lambda f: f[1])
+        fits = [shrunk(logs[of], like, chance) for like in (kinds, np.hstack([kinds, recordings]))]
+        joint, error = min(fits, key=lambda f: f[1])
         if error < chance:
             degrees[of] = freedom_of_variance(error)
             out[of] = np.exp(joint + bias(degrees[of[0]]))
@@ -54,8 +62,16 @@ def one_of_each(names: Sequence[str]) -> Floats:
 
 
 def shrunk(logs: Floats, like: Floats, chance: float) -> tuple[Floats, float]:
-    """((S,) logarithms drawn to what those like them say, the variance of their error): `like` (S, n) says how they
-    are, chance is the variance of each by itself."""
+    """Logarithms drawn to those like them.
+
+    Args:
+        logs: (S,) logarithms.
+        like: (S, n) kinds that each belongs to.
+        chance: variance of each by itself.
+
+    Returns:
+        ((S,) logarithms, the variance of their error).
+    """
     fitted = like @ np.linalg.lstsq(like, logs)[0]
     parameters = int(np.linalg.matrix_rank(like))
     known = len(logs) - parameters

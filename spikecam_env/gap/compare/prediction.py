@@ -6,13 +6,12 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from spikecam_env.gap.compare.pooled_variance import moderated
 from spikecam_env.gap.settings import DiagnosisSettings, checked_settings
 from spikecam_env.gap.statistics import StatisticKey, floor_of
 from spikecam_env.gap.unit.refit import BaseFit
-from spikecam_env.types import Floats
+from spikecam_env.types import Floats, Masks
 
 TOLERANCE = 0.05
 """Error of an effect's simulated change, relative: laws of first order in sub-frame time, beside a camera's.  More
@@ -26,54 +25,57 @@ PAIR_NOISE = {"rates": 0.15, "noise": 0.2, "rows": 0.3, "intervals": 0.5, "neigh
 
 @dataclass(frozen=True)
 class Draw:
-    """One simulated campaign.  number: of its random draws.  values: (S,), NaN where it was not simulated.
-
-    refit: of its unit, None where nothing was simulated that a refit rests on.
-    pattern: (S,) of its own rates, whose unit is the measured one, NaN elsewhere; those among `values` are of fresh
-    units.
-    """
+    """One simulated campaign."""
 
     number: int
+    """Of its random draws."""
     values: Floats
+    """(S,), NaN where it was not simulated."""
     refit: BaseFit | None
+    """Of its unit; None without the recordings that a refit rests on."""
     pattern: Floats | None = None
+    """(S,) of its own rates, whose unit is the measured one, NaN elsewhere; those among `values` are of fresh units."""
 
 
 @dataclass(frozen=True)
 class Prediction:
-    """What a model gives.  mean: (S,).  error: (S,) standard deviation of that mean.  spread: (S,) of one campaign.
-
-    draws: the campaigns it was learnt from.  own: (S,) what its effects do to the very unit; where None, that is its
-    distance from the null, whose unit has taken an effect's noise for its own where they are severe.
-    units: (U, S) of the drawn units that the pattern was learnt from, NaN elsewhere; of all models by the same draws.
-    """
+    """Statistics under a model."""
 
     mean: Floats
+    """(S,)."""
     error: Floats
+    """(S,) standard deviation of the mean."""
     spread: Floats
+    """(S,) standard deviation of one campaign."""
     draws: tuple[Draw, ...] = ()
+    """The campaigns that it was learnt from."""
     own: Floats | None = None
+    """(S,) change by its effects in the very unit; None: the distance from the null.  Beside a severe effect the null's
+    unit has taken its noise for its own."""
     units: Floats | None = None
+    """(U, S) of the drawn units that the pattern was learnt from, NaN elsewhere; of all models by the same draws."""
 
 
 @dataclass(frozen=True)
 class Null:
-    """What a model predicts.  keys: (S,).  mean, sd: (S,) over `twins` simulated campaigns, the whole ones kept in
-    `draws`, or of the pattern over as many drawn units.
-
-    floor: (S,) how exactly labels and laws are known at all, in the statistic's unit.  freedom: (S,) degrees of freedom
-    of sd.  weight: (S,) how much each says of its own: several recordings show one fixed pattern, which counts once.
-    settings: by which distances from it are judged.
-    """
+    """The null model's prediction, of which all others differ by an effect."""
 
     keys: tuple[StatisticKey, ...]
+    """(S,)."""
     mean: Floats
+    """(S,) over twins, or of the pattern over drawn units."""
     sd: Floats
+    """(S,) standard deviation of one of these."""
     floor: Floats
+    """(S,) error of labels and laws, in the statistic's unit."""
     twins: Floats | int
+    """(S,) number of twins or drawn units."""
     freedom: Floats | float
+    """(S,) degrees of freedom of sd."""
     weight: Floats | float = 1.0
+    """(S,) weight in a misfit: several recordings show one fixed pattern, which counts once."""
     draws: tuple[Draw, ...] = ()
+    """The whole simulated campaigns."""
     settings: DiagnosisSettings = field(default_factory=DiagnosisSettings)
 
     @property
@@ -94,13 +96,13 @@ def null_of(
     settings: DiagnosisSettings | None = None,
 ) -> Null:
     """From simulated campaigns 0, 1, ..., for the statistics in `keys` that all of them have."""
-    there = tuple(k for k in keys if all(k in b for b in banks))
-    values = np.array([[b[k] for k in there] for b in banks])
-    floor = np.maximum([floor_of(k) for k in there], 1e-9)
-    variances, freedom = moderated(there, values.var(axis=0, ddof=1), len(banks) - 1)
+    shared = tuple(k for k in keys if all(k in b for b in banks))
+    values = np.array([[b[k] for k in shared] for b in banks])
+    floor = np.maximum([floor_of(k) for k in shared], 1e-9)
+    variances, freedom = moderated(shared, values.var(axis=0, ddof=1), len(banks) - 1)
     draws = tuple(Draw(n, v, r) for n, (v, r) in enumerate(zip(values, refits, strict=False)))
     return Null(
-        there,
+        shared,
         values.mean(axis=0),
         np.sqrt(variances),
         floor,
@@ -115,6 +117,10 @@ def paired(null: Null, made: Sequence[Draw]) -> Prediction:
     """The prediction from campaigns with an effect, each less the null's of the same draws: their noise nearly cancels.
 
     Values that a draw lacks are the null's.  One pair has PAIR_NOISE of a campaign's noise; several show it by scatter.
+
+    Args:
+        null: with the same draws.
+        made: campaigns with the effect.
     """
     without = {d.number: d for d in null.draws}
     made = [
@@ -135,7 +141,11 @@ def with_pattern_moved(null: Null, made: Draw) -> Draw:
     """A campaign whose pattern is that of the null's fresh unit of the same number, moved by as much as an effect moves
     the pattern of a twin; by less than fresh units vary, not at all.
 
-    A response that bends or locks to the frames changes how far apart pixels are, though it is no pattern.
+    A response that bends or locks to the frames changes the distances between pixels, though it is no pattern.
+
+    Args:
+        null: with the draw of the same number.
+        made: the campaign with the effect.
     """
     without = next(d for d in null.draws if d.number == made.number)
     if made.pattern is None or without.pattern is None:
@@ -150,7 +160,7 @@ def pair_noise_share(keys: Sequence[StatisticKey]) -> Floats:
 
 
 def own_variance(null: Null, predicted: Prediction) -> Floats:
-    """(S,) of a prediction's mean, beyond what the null's own mean has."""
+    """(S,) variance of a prediction's mean, less that of the null's own mean."""
     return np.maximum(predicted.error**2 - null.sd**2 / null.twins, 0.0)
 
 
@@ -186,10 +196,7 @@ def pooled(keys: Sequence[StatisticKey], values: Floats) -> Floats:
 
 
 def spread_of(null: Null, values: Floats) -> Floats:
-    """(S,) standard deviation of statistics under a model with an effect, from its twins (n, S), at least the null's.
-
-    Rare events make statistics noisier than under the null model.
-    """
+    """(S,) standard deviation of statistics under a model with an effect, by its twins (n, S); the null's at least."""
     if len(values) < 2:
         return null.sd
     return np.asarray(np.sqrt(np.maximum(null.sd**2, half_pooled(null, values.var(axis=0, ddof=1)))))
@@ -201,8 +208,8 @@ def half_pooled(null: Null, variances: Floats) -> Floats:
     return 0.5 * variances + 0.5 * known * pooled(null.keys, variances) / pooled(null.keys, known)
 
 
-def from_drawn_units(null: Null, predicted: Prediction) -> NDArray[np.bool_]:
-    """(S,) which statistics are known from drawn units."""
+def from_drawn_units(null: Null, predicted: Prediction) -> Masks:
+    """(S,) whether statistics are known from drawn units."""
     if predicted.units is None:
-        return np.zeros(len(null.keys), np.bool_)
-    return np.asarray(np.isfinite(predicted.units).all(axis=0), np.bool_)
+        return np.zeros(len(null.keys), bool)
+    return np.asarray(np.isfinite(predicted.units).all(axis=0), bool)

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
 from spikecam_env.gap.compare.distance import APART, HEAVY, SHOWS, residual_and_misfit, robust_squares
 from spikecam_env.gap.compare.prediction import (
@@ -18,11 +17,11 @@ from spikecam_env.gap.compare.prediction import (
     total_variance,
     with_change_scaled,
 )
-from spikecam_env.types import Floats
+from spikecam_env.types import Floats, Masks
 
 ERROR_DAMPING = 5e-4
-"""Damping of the normal matrix that errors follow from: a step may be held back, an error must not be.  What it holds
-back is open."""
+"""Damping of the normal matrix that errors follow from: a step may be held back, an error must not be.  Directions
+that it holds back are open."""
 
 AS_WELL = 0.5
 """Share of its size on the best statistic from which an effect counts that is clear on none; of one that shows clearly,
@@ -33,8 +32,7 @@ MEDIAN_SQUARE = 0.455
 
 
 def likeliest(null: Null, measured: Floats, one: Prediction) -> tuple[float, float]:
-    """(factor, sd of its logarithm) that suits a prediction best which mostly scatters: by the misfit, with its
-    term for the spread."""
+    """(factor, sd of its logarithm) that suits a prediction of scatter best: by the misfit with its spread term."""
     factors = np.geomspace(0.01, 100.0, 200)
     left = np.array([residual_and_misfit(null, measured, with_change_scaled(null, one, f))[1] for f in factors])
     near = np.log(factors[left < left.min() + 1.0])
@@ -49,17 +47,26 @@ def step_of(
     noise: Floats | float = 0.0,
     before: Floats | float = 1.0,
 ) -> tuple[Floats, Floats]:
-    """(step (n,), covariance (n, n)): robust, slightly damped least squares for a jacobian (S, n).
-
-    noise: (S, n) of the jacobian.  before: (n,) prior standard deviation, of what the statistics leave open.
+    """A step of robust, slightly damped least squares.
 
     If most statistics are far off, residuals are scaled by their median; otherwise all would count as outliers.
 
-    Statistics are not independent: the covariance is of where the null's own draws would have led the step,
-    and, where there are as many of the effect as in the end, its own (other pixels have its traps), with the floors and
-    the tolerance of the effect, all of one sign, on top; of the fixed pattern, of drawn units: all recordings show one.
+    Statistics are not independent.  The covariance is that of the steps to which the null's own draws would lead; the
+    effect's own draws count too, where there are `in_the_end` of them, as other pixels have its traps.  Floors, and the
+    tolerance of the effect, all of one sign, are added.  The fixed pattern is of drawn units: all recordings show one.
     Where two parameters do nearly the same, noise of the jacobian would seem to separate them: the squares of it
     that are expected in the normal matrix are subtracted (errors in variables).
+
+    Args:
+        null: the null model.
+        measured: (S,) statistics, NaN where they take no part.
+        predicted: at the parameters.
+        jacobian: (S, n).
+        noise: (S, n) of the jacobian.
+        before: (n,) prior standard deviation.
+
+    Returns:
+        (step (n,), covariance (n, n)).
     """
     noise2 = total_variance(null, predicted)
     gap = np.nan_to_num(measured - predicted.mean)
@@ -87,27 +94,27 @@ def step_of(
 
 
 def chance_of_normal_matrix(w: Floats, jacobian: Floats, noise: Floats | float) -> Floats:
-    """(n, n) of a normal matrix with weights (S,), that the noise of its jacobian makes: each column is a twin less one
-    that they share.  noise: (S, n) of both, with the sign of the step between them."""
-    there = noise * (jacobian != 0)
-    shared = there.T @ (w[:, None] * there) / 2
+    """(n, n) part of a normal matrix with weights (S,) that is made by the noise of its jacobian, (S, n) with the sign
+    of the step: each column is a twin less one that they share."""
+    own = noise * (jacobian != 0)
+    shared = own.T @ (w[:, None] * own) / 2
     return np.asarray(shared + np.diag(np.diag(shared)))
 
 
 def principal_directions(normal: Floats, scale: Floats) -> tuple[Floats, Floats]:
-    """((n,) what is known, ERROR_DAMPING at least, (n, n) directions in units of 1 / `scale` (n,), one a row)."""
+    """((n,) weights, ERROR_DAMPING at least, (n, n) their directions in units of 1 / `scale` (n,), one a row)."""
     values, vectors = np.linalg.eigh(normal / np.outer(scale, scale))
     return np.maximum(values, 0.0) + ERROR_DAMPING, vectors.T * scale
 
 
 def step_covariance(solve: Floats, draws: Sequence[Floats] | Floats) -> Floats:
-    """(n, n) covariance of where campaigns such as these (S,), not their mean, lead a step (n,) = solve @ values."""
+    """(n, n) covariance of the steps (n,) = solve @ values of single campaigns (S,) such as these."""
     return np.atleast_2d(np.cov((np.nan_to_num(draws) @ solve.T).T)) * (1 + 1 / len(draws))
 
 
 def own_step_covariance(null: Null, predicted: Prediction, solve: Floats) -> Floats:
-    """(n, n) covariance of a step by the effect's own chance: of its draws where as many as in the end
-    move a statistic, of drawn units where they show it, elsewhere as of independent ones."""
+    """(n, n) covariance of a step by the effect's own chance: of its draws where `in_the_end` of them move a statistic,
+    of drawn units where they show it, elsewhere as of independent ones."""
     variances = np.maximum(predicted.spread**2 + predicted.error**2 - null.sd**2 * (1 + 1 / null.twins), 0.0)
     without = {d.number: d.values for d in null.draws}
     draws = predicted.draws if len(predicted.draws) >= null.settings.twins.in_the_end else ()
@@ -126,11 +133,9 @@ def slope_of(null: Null, measured: Floats, there: Prediction, here: Prediction, 
     return np.where(clear, change, 0.0) / step
 
 
-def change_of(
-    null: Null, measured: Floats, there: Prediction, here: Prediction
-) -> tuple[Floats, Floats, NDArray[np.bool_]]:
-    """((S,) change from one prediction to another, (S,) its noise, (S,) where it is clear of that).  What was not
-    measured (NaN), and may move more, is a matter of its own."""
+def change_of(null: Null, measured: Floats, there: Prediction, here: Prediction) -> tuple[Floats, Floats, Masks]:
+    """((S,) change from one prediction to another, (S,) its noise, (S,) whether it is clear of that).  Statistics that
+    were not measured (NaN) may move more, and are judged apart."""
     change, known = there.mean - here.mean, np.isfinite(measured)
     own2 = np.maximum(own_variance(null, there), own_variance(null, here))
     if there.units is not None and here.units is not None:
@@ -145,13 +150,21 @@ def change_of(
 def scale_of(
     gap: Floats, effect: Floats, of_gap: Floats, of_effect: Floats, tolerance: float = TOLERANCE
 ) -> tuple[float, float]:
-    """(scale, sd): by how much to multiply an effect's change of the statistics to come nearest to the measured one.
+    """The factor by which an effect's change of the statistics comes nearest to the measured one.
 
-    gap, effect: (S,) measured and simulated change.  of_gap, of_effect: (S,) their variances.  tolerance: error
-    of the effect, relative.
     Only statistics on which the simulated effect is clear of its own noise count: the noise of the others would drag
     the scale to 0 (regression dilution).  Under a heavy-tailed loss there are many minima: it is followed down from
     every ratio that many statistics agree on.
+
+    Args:
+        gap: (S,) measured change.
+        effect: (S,) simulated change.
+        of_gap: (S,) variance of the measured one.
+        of_effect: (S,) variance of the simulated one.
+        tolerance: error of the effect, relative.
+
+    Returns:
+        (factor, its standard deviation).
     """
     clear = is_clear(effect, of_gap + of_effect)
     if not clear.any():
@@ -179,7 +192,7 @@ def scale_to(null: Null, measured: Floats, predicted: Prediction) -> tuple[float
     return scale_of(gap, effect, null.noise**2, own_variance(null, predicted))
 
 
-def is_clear(effect: Floats, variance: Floats) -> NDArray[np.bool_]:
+def is_clear(effect: Floats, variance: Floats) -> Masks:
     """(S,) whether an effect stands clear of noise on a statistic, or, where it does on none, nearly as well as on its
     best: of 600 statistics a few are 4 noises off by chance."""
     size = np.abs(effect) / np.sqrt(variance)

@@ -31,7 +31,7 @@ from spikecam_env.gap.result import (
     Statistic,
     why_rejected,
 )
-from spikecam_env.gap.unit.usual import unusual
+from spikecam_env.gap.unit.refit import unusual
 from spikecam_env.sensor import CATALOGUE, SensorModel
 from spikecam_env.types import Floats
 

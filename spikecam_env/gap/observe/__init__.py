@@ -1,1 +1,1 @@
-"""A recording in numbers: what the camera was shown, and what the passes over its bits found."""
+"""A recording in numbers: its light, and the sums of the passes over its bits."""

@@ -1,4 +1,4 @@
-"""The passes over a recording's bits, compiled: pixel by pixel, and frame by frame.  They fill an `Observation`."""
+"""The passes over a recording's bits, compiled: pixel by pixel, and frame by frame, into an `ObservedRecording`."""
 
 from __future__ import annotations
 
@@ -119,9 +119,9 @@ def through_pixels(
 
 @njit(cache=True, nogil=True, boundscheck=False)
 def _count(d: NDArray[np.int32], least: np.int32, most: np.int32, lengths: NDArray[np.int64]) -> None:
-    """Add the intervals d, of least to most, to those of their length: length by length where these are few.
+    """Add the intervals d, of least to most, to `lengths` (4, n): length by length where these are few.
 
-    lengths: (4, n), for intervals in turn: a count that is added to at once again waits for itself.
+    The four rows take turns, since a count that is added to twice in a row waits for itself.
     """
     if most - least < FEW_LENGTHS:
         for length in range(least, most + 1):
@@ -166,7 +166,7 @@ def _add_to_spikes(
 
 @njit(cache=True, nogil=True, boundscheck=False)
 def add_rows(octets: NDArray[np.uint8], rows: int, spread: NDArray[np.uint64], sums: NDArray[np.uint64]) -> None:
-    """octets: (F, rows * each) uint8; sums: (parts, F, each), 255 rows a part, the most a byte can count."""
+    """Sum octets (F, rows * each) over rows into `sums` (parts, F, each): 255 rows a part, the most of a byte."""
     parts, frames, each = sums.shape
     for part in range(parts):
         for f in range(frames):
@@ -179,7 +179,7 @@ def add_rows(octets: NDArray[np.uint8], rows: int, spread: NDArray[np.uint64], s
 def through_frames(
     words: NDArray[np.uint64], rows: int, row: NDArray[np.int32], coincidences: NDArray[np.float64]
 ) -> None:
-    """words: (F, rows * n) uint64, each row of pixels n whole words, padded with zeros."""
+    """Count spikes by row, and coincidences of neighbours, in words (F, rows * n) padded with zeros to whole words."""
     frames = words.shape[0]
     each = words.shape[1] // rows
     right = words >> np.uint64(1)  # every pixel's neighbour to the right in its place

@@ -1,4 +1,4 @@
-"""A campaign as the diagnosis works with it: every recording observed, and what the camera was shown.
+"""A campaign in the diagnosis: the light of every recording, and its observation.
 
 Kinds of light: `dark`, `flat` (uniform and steady), `picture` (steady), `step` (uniform, changes in time), `moving`,
 `unknown` (a static scene that nobody measured) and `rates` (no spikes, only the rates of pixels).
@@ -17,6 +17,7 @@ from spikecam_env.campaign.reading import Campaign, CampaignRecording
 from spikecam_env.gap.acquisition.recording_kinds import Planned
 from spikecam_env.gap.observe.observation import ObservedRecording, observe
 from spikecam_env.sensor import Keyframes
+from spikecam_env.types import Masks
 
 STEADY_KNOWN = ("dark", "flat", "picture")
 """Kinds of steady light that was measured: a unit is refitted by these."""
@@ -31,19 +32,20 @@ LABEL_ERROR = 2e-5
 
 @dataclass(frozen=True)
 class Condition:
-    """One recording's conditions.  level: mean radiance; light: None where unknown; use: "fit" or "holdout".
-
-    static: (H, W) bool, the pixels to look at, in this recording and in its twins; None: all.
-    """
+    """One recording's conditions."""
 
     name: str
     kind: str
     level: float
+    """Mean radiance."""
     light: Keyframes | None
+    """None where unknown."""
     frames: int
     use: str
+    """`fit` or `holdout`."""
     v_d: float | None = None
-    static: NDArray[np.bool_] | None = None
+    static: Masks | None = None
+    """(H, W) pixels that count, in this recording and in its twins; None: all."""
 
     @property
     def moves(self) -> bool:
@@ -58,7 +60,7 @@ class Condition:
 
 
 def condition_of(recording: CampaignRecording) -> Condition:
-    """The conditions of a recording, and which kind of light they are."""
+    """The conditions of a recording, with its kind of light."""
     light = recording.light()
     if light is None:
         return Condition(recording.name, "unknown", np.nan, None, recording.frames, recording.use, recording.v_d)

@@ -1,4 +1,4 @@
-"""A recording reduced to numbers, in two passes over its bits: what every statistic is computed from.
+"""A recording reduced to numbers, in two passes over its bits: the input of every statistic.
 
 Per pixel: spike times at both ends, second differences A_k, interval moments, counts by block of time.
 Per frame: spikes of the array, of each row and of each column.  Neighbours: coincidences at lags of 0 to 2 frames.
@@ -38,42 +38,49 @@ FRAME_LAGS = 3
 
 @dataclass(frozen=True)
 class ObservedRecording:
-    """One recording in numbers; P pixels row-major, F frames, shape (H, W).
-
-    times: ends, counts and A_k of each pixel.  variance, covariance: (P,) of intervals, and of successive ones, about
-    the pixel's own mean [frames^2]; NaN below 3 intervals.  short, long: (P,) intervals T below 0.6 T - 1 or
-    above 1.5 T + 1 of the mean.  lengths: (LENGTHS,) intervals of the array by length, 1 frame first.
-    blocks: (TIME_BLOCKS, P) counts.
-    frame, row, column: (F,), (F, H), (F, W) spikes.  coincidences: (FRAME_LAGS, 2) spikes of one pixel with its
-    neighbour's, lag by lag, along rows and along columns.  film: (F // BIN, P) uint8 counts, or None for static light.
-    late: (F,) sum over the `timed` (F,) intervals that end in a frame of what they are longer than the pixel's mean
-    [frames], of pixels without short or long ones; scatter: (F,) of the variances of those pixels' intervals.
-    odd: (F,) short and long intervals that end in a frame.
-    flips: (P, 2) spikes a frame late with the next one back on time, and a frame early, of pixels whose mean interval
-    is within BESIDE_WHOLE of a whole number; 0 elsewhere.
-    """
+    """One recording in numbers; P pixels row-major, F frames."""
 
     shape: tuple[int, int]
+    """(H, W)."""
     times: SpikeTimes
+    """Ends, counts and A_k of each pixel."""
     variance: Floats
+    """(P,) of intervals, about the pixel's own mean [frames^2]; NaN below 3 intervals."""
     covariance: Floats
+    """(P,) of successive intervals, as `variance`."""
     short: NDArray[np.int64]
+    """(P,) intervals below 0.6 T - 1, T the pixel's mean."""
     long: NDArray[np.int64]
+    """(P,) intervals above 1.5 T + 1."""
     lengths: NDArray[np.int64]
+    """(LENGTHS,) intervals of the array by length, 1 frame first."""
     blocks: NDArray[np.int32]
+    """(TIME_BLOCKS, P) counts."""
     frame: NDArray[np.int32]
+    """(F,) spikes."""
     row: NDArray[np.int32]
+    """(F, H) spikes."""
     column: NDArray[np.int32]
+    """(F, W) spikes."""
     coincidences: Floats
+    """(FRAME_LAGS, 2) spikes of one pixel with its neighbour's, lag by lag, along rows and along columns."""
     film: NDArray[np.uint8] | None
+    """(F // BIN, P) counts, or None for static light."""
     late: Floats
+    """(F,) excess of the `timed` intervals that end in a frame over their pixels' means, summed [frames]."""
     scatter: Floats
+    """(F,) variances of those pixels' intervals, summed [frames^2]."""
     timed: NDArray[np.int32]
+    """(F,) intervals that end in a frame, of pixels without short or long ones."""
     odd: NDArray[np.int32]
+    """(F,) short and long intervals that end in a frame."""
     flips: NDArray[np.int32]
+    """(P, 2) spikes a frame late with the next one back on time, and a frame early, of pixels whose mean interval is
+    within BESIDE_WHOLE of a whole number; 0 elsewhere."""
 
     @property
     def frames(self) -> int:
+        """Length of the recording."""
         return self.times.frames
 
     @property
@@ -95,9 +102,13 @@ def observe(
     film: bool = False,
     static: NDArray[np.bool_] | None = None,
 ) -> ObservedRecording:
-    """Reduce (F, ceil(H W / 8)) uint8 bits; film: keep counts in bins of time.
+    """Reduce the bits of a recording to numbers.
 
-    static: (H, W), the pixels to look at; all others count as silent.
+    Args:
+        packed: (F, ceil(H W / 8)) bits.
+        shape: (H, W).
+        film: whether to keep counts in bins of time.
+        static: (H, W) pixels that count; all others are taken as silent.
     """
     if static is not None:
         packed = packed & pack_frames(static[None])
@@ -150,7 +161,7 @@ def _rows_in_words(packed: NDArray[np.uint8], shape: tuple[int, int]) -> NDArray
 
 
 _SPREAD = np.unpackbits(np.arange(256, dtype=np.uint8)[:, None], axis=1, bitorder="little").view(np.uint64)[:, 0]
-"""(256,) the eight bits of a byte as eight bytes of a word, which add up side by side."""
+"""(256,) the eight bits of a byte as eight bytes of a word, which add side by side."""
 
 
 def _columns(by_row: NDArray[np.uint64], shape: tuple[int, int]) -> NDArray[np.int32]:
@@ -163,7 +174,7 @@ def _columns(by_row: NDArray[np.uint64], shape: tuple[int, int]) -> NDArray[np.i
 
 
 def _film(words: NDArray[np.uint64], pixels: int) -> NDArray[np.uint8]:
-    """(F // BIN, P) spikes of each pixel in bins of BIN frames; words: (F, n) its bits."""
+    """(F // BIN, P) spikes of each pixel in bins of BIN frames, from words (F, n) of bits."""
     bins = len(words) // BIN
     octets = words[: bins * BIN].view(np.uint8).reshape(bins, -1)
     sums = np.zeros((1, bins, octets.shape[1] // BIN), np.uint64)

@@ -26,21 +26,17 @@ from spikecam_env.types import Floats
 
 @dataclass(frozen=True, eq=False)
 class Screened:
-    """A candidate by its template.
-
-    Args:
-        name: of the candidate.
-        start: parameters to fit from.
-        misfit: that it would leave.
-        expected: (S,) change of the statistics at the start.
-        white: s^2 of the unit at the start, over the refit's.
-    """
+    """A candidate by its template."""
 
     name: str
     start: dict[str, float]
+    """Parameters to fit from."""
     misfit: float
+    """That it would leave."""
     expected: Floats
+    """(S,) change of the statistics at the start."""
     white: float = 1.0
+    """s^2 of the unit at the start, over the refit's."""
 
 
 def screen(
@@ -56,7 +52,7 @@ def screen(
     Args:
         templates: the bank.
         conditions: of the recordings.
-        null: what the model predicts without a candidate.
+        null: prediction of the model without a candidate.
         measured: (S,) statistics, NaN where they take no part.
         names: of the candidates.
         line_hz: frequency [Hz] of the strongest line of the measured spectra, from which periodic candidates start.

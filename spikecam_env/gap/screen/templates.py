@@ -33,16 +33,16 @@ FILE = "templates.npz"
 
 @dataclass(frozen=True)
 class Template:
-    """parameters: at which `shift` (S,), in noise, was simulated.  times: the strength, over the weakest of its shape.
-
-    white: s^2 of the unit, over what it is refitted as: a severe noise is first taken for the unit's own.
-    """
+    """The change of the statistics by one candidate."""
 
     name: str
     parameters: dict[str, float]
     shift: Floats
+    """(S,) change, in noise, at these parameters."""
     times: float = 1.0
+    """The strength, over the weakest of its shape."""
     white: float = 1.0
+    """s^2 of the unit, over its refit: a severe noise is first taken for the unit's own."""
 
     @property
     def shape(self) -> tuple[str, frozenset[Any]]:
@@ -53,18 +53,19 @@ class Template:
 
 @dataclass(frozen=True)
 class Templates:
-    """keys: (S,) of the standard design's statistics; noise: (S,) theirs, of which `shift` is so many.
-
-    levels: radiance of its recordings by name; kinds: of them.  laws: digests of the effects that were simulated, by
-    name (`sensor/effect_law.py`).
-    """
+    """Templates of one design."""
 
     keys: tuple[StatisticKey, ...]
+    """(S,) of the design's statistics."""
     noise: Floats
+    """(S,) in which a shift is measured."""
     levels: dict[str, float]
+    """Radiance of its recordings by name."""
     kinds: dict[str, str]
+    """Kind of its recordings by name."""
     entries: tuple[Template, ...]
     laws: dict[str, str] = field(default_factory=dict)
+    """Digests of the effects that were simulated, by name (`sensor/effect_law.py`)."""
 
     @property
     def weakest(self) -> tuple[Template, ...]:
@@ -72,10 +73,8 @@ class Templates:
         return tuple(e for e in self.entries if e.times == 1.0)
 
     def with_those_of(self, others: Iterable[Templates]) -> Templates:
-        """These, with the effects of others in place of their own; in the order of the catalogue, and in this noise.
-
-        A statistic that others lack is taken not to change.
-        """
+        """These, with the effects of others in place of their own, in the order of the catalogue and in this noise; a
+        statistic that others lack does not change."""
         laws = {name: law for more in others for name, law in more.laws.items()}
         new = [replace(e, shift=self._in_this_noise(more, e.shift)) for more in others for e in more.entries]
         kept = [e for e in self.entries if e.name not in laws]
@@ -91,7 +90,7 @@ class Templates:
 
 
 class _Entry(Declared):
-    """A template, but for its shift."""
+    """A template without its shift."""
 
     name: str
     parameters: dict[str, float]
@@ -100,7 +99,7 @@ class _Entry(Declared):
 
 
 class _About(Declared):
-    """What a file of templates holds beside arrays."""
+    """The part of a file of templates beside arrays."""
 
     keys: list[Annotated[list[str], Field(min_length=3, max_length=3)]]
     levels: dict[str, float]
@@ -116,7 +115,11 @@ def shipped_templates() -> Templates:
 
 
 def read_templates(path: Path) -> Templates:
-    """Templates as `save_templates` writes them; raises InputError for a file that is no such."""
+    """Templates as `save_templates` writes them.
+
+    Raises:
+        InputError: for any other file.
+    """
     arrays = read_arrays(path, ("about", "shift", "noise"))
     about = declared(_About, parse_json(str(arrays["about"]), str(path)), str(path))
     shifts = numbers(arrays["shift"], "shift", str(path)).astype(np.float64)

@@ -1,9 +1,9 @@
 """Whether spikes of a scene follow the array's clock, band by band of rows: pixels whose interval is nearly whole.
 
-In a camera whose pixels integrate freely, as many pixels lie near a whole interval as light puts there, their noise
-is that of the others, and a spike comes a frame late as often as early.  A threshold disturbed at one moment of the
-array's frame gathers pixels in every row; rows that are read at that moment show it as late and early spikes, the
-others only by what gathers (clock_feedthrough with readout_skew).  Rows pooled hide it.  A reset coupled to the
+In a camera whose pixels integrate freely, light alone puts pixels near a whole interval.  Their noise is that of the
+others, and a spike comes a frame late as often as early.  A threshold disturbed at one moment of the array's frame
+gathers pixels in every row; rows that are read at that moment show it as late and early spikes, the others only by the
+gathering (clock_feedthrough with readout_skew).  Rows pooled hide it.  A reset coupled to the
 read-out (synchronous_reset in small shares) looks the same in all rows.  A_k at several k, away from whole intervals:
 noise that is not drawn anew for each spike.  Only scenes have every interval in them; flats have too few.
 """
@@ -11,12 +11,12 @@ noise that is not drawn anew for each spike.  Only scenes have every interval in
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from spikecam_env.calibration.real import ideal_second_difference
 from spikecam_env.gap.observe.bit_passes import BESIDE_WHOLE
 from spikecam_env.gap.observe.observation import DIFFERENCES, ObservedRecording
 from spikecam_env.gap.statistics.reading import CampaignReading, root
+from spikecam_env.types import Floats, Masks
 
 AT_WHOLE = 0.005
 """Distance of a mean interval from a whole number, up to which a pixel is counted [frames]."""
@@ -33,11 +33,14 @@ MOST_BANDS = 10
 
 
 def statistics(reading: CampaignReading, i: int) -> dict[str, float]:
-    """whole b: pixels of band b within AT_WHOLE of a whole mean interval, counted; band 0 is at the top.
+    """Statistics of pixels near a whole interval, by band b of rows, 0 at the top.
 
-    late b, early b: of pixels within BESIDE_WHOLE, spikes a frame late (early) with the next one back on time, counted.
-    A_1 below b, A_1 above b: mean of A_1 less that of an ideal pixel of the same interval, over 2 [1e-3 frames^2], of
-    pixels within BESIDE_WHOLE of a whole interval on either side; A_k between: of all others, over 2 k.
+    Returns:
+        whole b: pixels within AT_WHOLE of a whole mean interval, counted.
+        late b, early b: spikes a frame late (early) with the next one on time, counted, of pixels within BESIDE_WHOLE.
+        A_1 below b, A_1 above b: mean of A_1 less that of an ideal pixel of the same interval, over 2 [1e-3 frames^2],
+            of pixels within BESIDE_WHOLE of a whole interval on either side.
+        A_k between: the same of all others, over 2 k.
     """
     if reading.conditions[i].kind != "unknown":
         return {}
@@ -60,7 +63,7 @@ def statistics(reading: CampaignReading, i: int) -> dict[str, float]:
     return found
 
 
-def bands(shape: tuple[int, int], frames: int) -> list[NDArray[np.bool_]]:
+def bands(shape: tuple[int, int], frames: int) -> list[Masks]:
     """(P,) pixels of each band, by equal numbers of rows: as many as BAND allows, MOST_BANDS at most."""
     rows, columns = shape
     count = int(np.clip(rows * columns * frames // BAND, 1, min(MOST_BANDS, rows)))
@@ -68,9 +71,7 @@ def bands(shape: tuple[int, int], frames: int) -> list[NDArray[np.bool_]]:
     return [band == b for b in range(count)]
 
 
-def _mean(
-    o: ObservedRecording, excess: NDArray[np.float64], part: NDArray[np.bool_], j: int, name: str
-) -> dict[str, float]:
+def _mean(o: ObservedRecording, excess: Floats, part: Masks, j: int, name: str) -> dict[str, float]:
     terms = o.times.terms[part, j].sum()
     if terms < LEAST_DIFFERENCES:
         return {}

@@ -26,9 +26,16 @@ SCATTER = 2e-4
 
 
 def statistics(reading: CampaignReading, i: int) -> dict[str, float]:
-    """trend: relative change of the array from start to end.  bend: half against half, curvature.  wander: log
-    variance of what is left.  pixels: log variance of blocks within a pixel, about what all do.  pixel tail: of
-    the one pixel in 50 that varies most, by mean.  late 0 .. 7, in the dark: `lateness`."""
+    """Statistics of slow change.
+
+    Returns:
+        trend: relative change of the array from start to end.
+        bend: half against half, curvature.
+        wander: log variance of the rest.
+        pixels: log variance of blocks within a pixel, about the mean of all.
+        pixel tail: that of the one pixel in 50 that varies most, over the mean.
+        late 0 .. 7: `lateness`, in the dark.
+    """
     if reading.conditions[i].kind not in STEADY:
         return {}
     o = reading.observations[i]
@@ -51,10 +58,13 @@ def statistics(reading: CampaignReading, i: int) -> dict[str, float]:
 
 
 def lateness(o: ObservedRecording) -> dict[str, float]:
-    """How much longer intervals are that end in each part of a recording, against each pixel's own mean; relative.
+    """Relative excess of the intervals that end in each part of a recording over each pixel's own mean.
 
     In the dark pixels fire seldom but evenly: a slow change shows far better in the length of intervals than in their
     number.  Where noise of whole frames or ripple makes the pieces of a part scatter, lateness is divided by that.
+
+    Args:
+        o: the recording.
     """
     usual = o.frames * o.shape[0] * o.shape[1] / max(int(o.frame.sum()), 1)
     begins = np.arange(PARTS * PIECES) * o.frames // (PARTS * PIECES)

@@ -1,6 +1,6 @@
 """The film that moving light leaves, and its features: the change of it that each kind of effect makes.
 
-Features are made orthogonal in this order, so that each holds what those before it do not: level, square, delay, skew,
+Features are made orthogonal in this order, each to those before it: level, square, delay, skew,
 lag 16 / 64 / 256 / 2000 frames, blur, row, column, bloom.
 """
 
@@ -11,14 +11,13 @@ from dataclasses import dataclass
 
 import numpy as np
 import scipy
-from numpy.typing import NDArray
 
 from spikecam_env.gap.observe.conditions import Condition
 from spikecam_env.gap.observe.observation import BIN
 from spikecam_env.gap.unit.refit import BaseFit
 from spikecam_env.sensor import Keyframes
 from spikecam_env.sensor.between_keys import key_weights
-from spikecam_env.types import Pictures
+from spikecam_env.types import Floats, Pictures
 
 FEATURES = ("level", "square", "delay", "skew", "lag 16", "lag 64", "lag 256", "lag 2000", "blur", "row", "column",
             "bloom")  # fmt: skip
@@ -26,14 +25,14 @@ FEATURES = ("level", "square", "delay", "skew", "lag 16", "lag 64", "lag 256", "
 
 @dataclass(frozen=True)
 class FilmFeatures:
-    """light: (bins, P) collected in each bin at gain 1.  basis: (n, bins P) its orthonormal features.
-
-    size: (n,) of each feature before it was scaled, 0 where those before it span it.
-    """
+    """The film of a moving light and its features."""
 
     light: Pictures
+    """(bins, P) collected in each bin at gain 1."""
     basis: Pictures
-    size: NDArray[np.float64]
+    """(n, bins P) orthonormal features."""
+    size: Floats
+    """(n,) of each feature before it was scaled, 0 where those before it span it."""
 
 
 def films(conditions: Sequence[Condition], shape: tuple[int, int]) -> dict[str, FilmFeatures]:
@@ -57,14 +56,14 @@ def light_film(light: Keyframes, frames: int) -> Pictures:
     return out
 
 
-def refitted_film(condition: Condition, base: BaseFit) -> NDArray[np.float64]:
+def refitted_film(condition: Condition, base: BaseFit) -> Floats:
     """(F // BIN, P) spikes that a refitted unit gives in moving light, at most one a frame."""
     assert condition.light is not None
     light = light_film(condition.light, condition.frames).astype(np.float64)
     return np.minimum(light * base.gain + BIN * base.dark, BIN)
 
 
-def film_features(light: Pictures, shape: tuple[int, int]) -> tuple[Pictures, NDArray[np.float64]]:
+def film_features(light: Pictures, shape: tuple[int, int]) -> tuple[Pictures, Floats]:
     """Orthonormal features (n, bins P) of the nominal camera's film, and how large each was before that."""
     bright = light / BIN
     x = np.minimum(bright, np.float32(1.0))

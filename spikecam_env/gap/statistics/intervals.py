@@ -12,8 +12,12 @@ from spikecam_env.gap.statistics.reading import CampaignReading, root
 
 
 def statistics(reading: CampaignReading, i: int) -> dict[str, float]:
-    """short, long: intervals below 0.6 T - 1 and above 1.5 T + 1, counted.  length n: intervals of n frames, counted,
-    where that is below half the interval of nearly all pixels."""
+    """Counts of irregular intervals.
+
+    Returns:
+        short, long: intervals below 0.6 T - 1 and above 1.5 T + 1.
+        length n: intervals of n frames, where that is below half the interval of nearly all pixels.
+    """
     if reading.conditions[i].kind not in STEADY:
         return {}
     o = reading.observations[i]

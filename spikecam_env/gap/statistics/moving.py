@@ -13,7 +13,12 @@ from spikecam_env.gap.statistics.reading import CampaignReading
 
 
 def statistics(reading: CampaignReading, i: int) -> dict[str, float]:
-    """One number a feature: its share in what is left, over the feature's own size; left: log rms of the rest."""
+    """The measured film less the expected one, by features.
+
+    Returns:
+        level, square, ...: share of a feature in the difference, over the feature's own size.
+        left: log rms of the rest.
+    """
     condition = reading.conditions[i]
     counts = reading.observations[i].film
     film = reading.films.get(condition.name)

@@ -15,10 +15,13 @@ from spikecam_env.gap.statistics.reading import CampaignReading, log
 
 
 def statistics(reading: CampaignReading, i: int) -> dict[str, float]:
-    """variance: mean over pixels of interval variance less f(1-f), over T.  lag-1: pooled serial correlation.
+    """Noise of pixels without irregular intervals: single events are counted as such (`intervals`), and are no noise.
 
-    A_k: measured over expected from the refitted jitter, less one.  tail: pixels with much larger A_16 than most.
-    Of pixels without irregular intervals: single events are counted as such (`intervals`), and are no noise.
+    Returns:
+        variance: mean over pixels of interval variance less f(1-f), over T.
+        lag-1: pooled serial correlation.
+        A_k: measured over expected from the refitted jitter, less one.
+        tail: log of the 99 % quantile of A_16 over its median.
     """
     if reading.conditions[i].kind not in STEADY:
         return {}

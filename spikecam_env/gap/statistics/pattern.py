@@ -23,14 +23,18 @@ PATCHES_A_SIDE = 8
 
 
 def statistics(rate: Floats) -> dict[str, float]:
-    """Of a rate map (H, W).
+    """Statistics of a rate map (H, W); of a NARROW map only that width, and `silent`.
 
-    width: log of the robust relative spread.  low / high tail: how much further the 0.5 % and 99.5 % quantiles lie
-    than those of a Gaussian, in spreads; top: the largest.  over 5, 10, 20, 40: pixels so many spreads above the
-    median, counted; silent: those below a tenth of it.
-    rows, columns: log variance of their means over a pixel's.  bowl, across, down: radial slope and gradients.
-    near: correlation of neighbours.  patch: the mean of a patch of pixels that is furthest off, in its standard errors.
-    Of a map that is NARROW: its width, as if it were that, and silent.
+    Returns:
+        width: log of the robust relative spread.
+        low tail, high tail: distance of the 0.5 % and 99.5 % quantiles from the median, in spreads; high as a log.
+        top: log of the largest, in spreads.
+        over 5, 10, 20, 40: pixels so many spreads above the median, counted.
+        silent: pixels below a tenth of the median, counted.
+        rows, columns: log variance of their means over a pixel's.
+        bowl, across, down: radial slope and gradients.
+        near: correlation of neighbours.
+        patch: log of the mean of a patch of pixels that is furthest off, in its standard errors.
     """
     flat = rate.reshape(-1)
     middle = float(np.median(flat))

@@ -1,7 +1,7 @@
 """Rates against the straight line gain L + dark that each pixel has through all fit levels.
 
-Reveals what bends the response (dead_time, comparator_delay, photo_response_nonlinearity, incomplete_reset, ir_drop),
-labels that are wrong, and responses that hold only in a part of the array.
+Reveals a bent response (dead_time, comparator_delay, photo_response_nonlinearity, incomplete_reset, ir_drop), labels
+that are wrong, and responses that hold only in a part of the array.
 """
 
 from __future__ import annotations
@@ -13,9 +13,13 @@ from spikecam_env.gap.statistics.reading import CampaignReading, log, slope
 
 
 def statistics(reading: CampaignReading, i: int) -> dict[str, float]:
-    """level: mean relative residual.  slope: of the residual on the pixel's own rate.  scatter: log rms.
+    """Statistics of the residuals.
 
-    corners: mean residual of each quarter of the array less the array's.
+    Returns:
+        level: mean relative residual.
+        slope: of the residual on the pixel's own rate.
+        scatter: log rms.
+        top-left corner, ...: mean residual of a quarter of the array less the array's.
     """
     condition = reading.conditions[i]
     if condition.kind not in STEADY_KNOWN:

@@ -17,15 +17,14 @@ from spikecam_env.types import Floats
 
 @dataclass(frozen=True)
 class CampaignReading:
-    """One campaign, measured or simulated.  base: refitted from these observations and no others.
-
-    films: of moving light, by recording (`film.films`).
-    """
+    """One campaign, measured or simulated."""
 
     observations: Sequence[ObservedRecording]
     conditions: Sequence[Condition]
     base: BaseFit
+    """Refitted from these observations and no others."""
     films: Mapping[str, FilmFeatures]
+    """Of moving light, by recording (`film.films`)."""
 
     def expected(self, i: int) -> Floats:
         """(P,) thresholds a frame of recording i, steady light, by the refit; its own rate where light is unknown."""

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from spikecam_env.gap.observe.conditions import STEADY
 from spikecam_env.gap.statistics.reading import CampaignReading, log
+from spikecam_env.types import Floats
 
 BANDS = 8
 
@@ -21,15 +22,18 @@ _SIDE = 25
 """Bins to either side whose median a line is compared with."""
 
 
-def spectrum(frame: NDArray[np.int32]) -> NDArray[np.float64]:
+def spectrum(frame: NDArray[np.int32]) -> Floats:
     """Periodogram of spikes a frame, relative to their mean; bin n is n cycles in the recording.
 
-    Tapered (Hann): spikes are noise of high frequency, which would leak to the lowest, by chance of how many of the
-    pixels' intervals the recording's two ends cut.
+    It is tapered (Hann): spikes are noise of high frequency, and a recording's two ends, which cut intervals, would
+    leak it to the lowest.
+
+    Args:
+        frame: (F,) spikes.
     """
     relative = frame / max(float(frame.mean()), 1e-9) - 1.0
     taper = np.hanning(len(frame))
-    power: NDArray[np.float64] = np.abs(np.fft.rfft(taper * relative)) ** 2 / (taper @ taper)
+    power: Floats = np.abs(np.fft.rfft(taper * relative)) ** 2 / (taper @ taper)
     return power
 
 
@@ -39,7 +43,12 @@ def bands(frames: int) -> NDArray[np.int64]:
 
 
 def statistics(reading: CampaignReading, i: int) -> dict[str, float]:
-    """band n: log power.  line: log of the strongest bin over what is around it, below a quarter of the rate."""
+    """Bands and the strongest line.
+
+    Returns:
+        band n: log power.
+        line: log of the strongest bin over its neighbourhood, below a quarter of the rate.
+    """
     if reading.conditions[i].kind not in STEADY:
         return {}
     o = reading.observations[i]
@@ -52,11 +61,17 @@ def statistics(reading: CampaignReading, i: int) -> dict[str, float]:
     return found
 
 
-def strongest_line(power: NDArray[np.float64]) -> tuple[int, float]:
-    """(bin, power over the median of its neighbourhood) of the strongest bin above the slowest two.
+def strongest_line(power: Floats) -> tuple[int, float]:
+    """The strongest bin above the slowest two.
 
     The neighbourhood is the side of more power: where dim pixels' own rates begin, power rises a thousandfold in
     ten bins, and the first of them would stand out as a line.
+
+    Args:
+        power: (n,) `spectrum`.
+
+    Returns:
+        (bin, power over the median of its neighbourhood).
     """
     low = power[3 : max(len(power) // 2, 8)]
     width = min(_SIDE, len(low) - 1)

@@ -8,22 +8,24 @@ from __future__ import annotations
 import itertools
 
 import numpy as np
-from numpy.typing import NDArray
 
+from spikecam_env.gap.observe.conditions import Condition
 from spikecam_env.gap.statistics.reading import CampaignReading, slope
 from spikecam_env.sensor.between_keys import frame_means
+from spikecam_env.types import Floats
 
 EDGES = (0, 1, 2, 4, 8, 16, 32, 64, 128, 256)
 """Lags after an edge [frames], ends of the windows."""
 
 
-def uniform_light(condition) -> NDArray[np.float64]:  # type: ignore[no-untyped-def]
+def uniform_light(condition: Condition) -> Floats:
     """(F,) mean radiance of every frame."""
     light = condition.light
+    assert light is not None
     return frame_means(light.frame, light.radiance[:, 0, 0].astype(np.float64), condition.frames)
 
 
-def edges_of(level: NDArray[np.float64]) -> list[tuple[int, float]]:
+def edges_of(level: Floats) -> list[tuple[int, float]]:
     """(frame, height) where light has changed by most of the recording's range within two frames."""
     change = level[2:] - level[:-2]
     least = 0.5 * (level.max() - level.min())
@@ -35,9 +37,11 @@ def edges_of(level: NDArray[np.float64]) -> list[tuple[int, float]]:
 
 
 def statistics(reading: CampaignReading, i: int) -> dict[str, float]:
-    """up / down a-b: spikes missing or over, a to b frames after an edge, in frames of the step's height.
+    """Spikes after edges of light.
 
-    row up / row down: the same of the first 4 frames, as a slope from the first row to the last.
+    Returns:
+        up a-b, down a-b: spikes missing or over, a to b frames after an edge, in frames of the step's height.
+        row up, row down: the same of the first 4 frames, as a slope from the first row to the last.
     """
     condition = reading.conditions[i]
     if condition.kind != "step":

@@ -1,4 +1,4 @@
-"""How rates vary over the array and over pixels, of one map: fine grain, shading, quantiles.
+"""The variation of rates over the array and over pixels, of one map: fine grain, shading, quantiles.
 
 Reveals vignetting (fields, smooth), spreads (fine), dark_current_tail and hot_pixels (quantiles), row_fixed_pattern and
 column_fixed_pattern (lags along one axis and not the other).
@@ -27,11 +27,15 @@ _WINDOW = 5
 
 
 def statistics(rate: Floats) -> dict[str, float]:
-    """Of a map (H, W); nothing where its median is 0.
+    """Statistics of a rate map (H, W); nothing where its median is 0.
 
-    fine: log spread of pixels about the mean of their neighbourhood, outliers clipped.  grain q: quantiles of
-    that, in its spreads.  smooth: log spread of the neighbourhoods.  field r c: relative mean of a ninth of the array.
-    across n, down n: correlation of pixels n apart.  q: log quantiles over the median, of maps without negative rates.
+    Returns:
+        fine: log spread of pixels about the mean of their neighbourhood, outliers clipped.
+        grain q: quantiles of the same, in its spreads.
+        smooth: log spread of the neighbourhoods.
+        field r c: relative mean of a ninth of the array.
+        across n, down n: correlation of pixels n apart.
+        q: log quantiles over the median, of maps without negative rates.
     """
     middle = float(np.median(rate))
     if middle <= 0:

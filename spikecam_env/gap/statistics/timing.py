@@ -1,4 +1,4 @@
-"""How late the array's spikes come, frame by frame, against each pixel's own mean interval.
+"""The lateness of the array's spikes, frame by frame, against each pixel's own mean interval.
 
 The mean lateness of many spikes measures a frame's time better than their number: pixels fire regularly, whatever
 their phases.
@@ -17,10 +17,13 @@ SLOWEST_INTERVAL = 1.5
 
 
 def statistics(reading: CampaignReading, i: int) -> dict[str, float]:
-    """late: log variance over frames of the mean lateness of their spikes, over that of spikes on their own.
+    """Lateness of pixels without irregular intervals, where these are most.
 
-    next: correlation of one frame's lateness with the next one's.  Of pixels without irregular intervals,
-    where these are most, and after SLOWEST_INTERVAL: in the first frames only short intervals have ended.
+    It begins after SLOWEST_INTERVAL: in the first frames only short intervals have ended.
+
+    Returns:
+        late: log variance over frames of the mean lateness of their spikes, over that of spikes on their own.
+        next: correlation of one frame's lateness with the next one's.
     """
     if reading.conditions[i].kind not in STEADY:
         return {}

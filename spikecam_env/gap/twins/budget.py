@@ -15,30 +15,33 @@ OVERRUN = 1.3
 
 @dataclass
 class Budget:
-    """limit: recordings after which no optional step is begun.
-
-    spent: simulated recordings, one number a twin.  left_out: steps that were skipped.
-    verdict_known: whether the verdict is decided, so that every further step is optional.
-    """
+    """Simulated recordings, and their limit."""
 
     limit: float = math.inf
+    """Recordings after which no optional step begins."""
     spent: list[int] = field(default_factory=list)
+    """Simulated recordings, one number a twin."""
     left_out: list[str] = field(default_factory=list)
+    """Steps that were skipped."""
     verdict_known: bool = False
+    """Whether the verdict is decided, so that every further step is optional."""
 
     @property
     def simulated(self) -> int:
         """Recordings so far."""
         return sum(self.spent)
 
-    def allows(self, what: str, recordings: int = 0, *, needed: bool = False) -> bool:
-        """Whether the step `what`, which takes at least so many recordings, may begin; a refusal is noted.
+    def allows(self, step: str, recordings: int = 0, *, needed: bool = False) -> bool:
+        """Whether a step may begin; a refusal is noted.
 
-        needed: an undecided verdict needs this step, so it may overrun the limit.
+        Args:
+            step: its name.
+            recordings: that it takes at least.
+            needed: whether an undecided verdict needs it, so that it may overrun the limit.
         """
         limit = self.limit * (OVERRUN if needed and not self.verdict_known else 1.0)
         if self.simulated + recordings < limit:
             return True
-        if what not in self.left_out:
-            self.left_out.append(what)
+        if step not in self.left_out:
+            self.left_out.append(step)
         return False

@@ -1,4 +1,4 @@
-"""One measurement under diagnosis: what was shown and seen, and how to simulate the same campaign under a model."""
+"""One measurement under diagnosis: light and observations, and the simulation of the same campaign under a model."""
 
 from __future__ import annotations
 
@@ -7,7 +7,6 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from spikecam_env.gap.observe.conditions import STEADY_KNOWN, Condition
 from spikecam_env.gap.observe.observation import ObservedRecording
@@ -20,27 +19,28 @@ from spikecam_env.gap.twins.simulate import FIRST_SEED
 from spikecam_env.gap.twins.unknown_scene import simulate_seen
 from spikecam_env.gap.unit.refit import BaseFit, free_refit
 from spikecam_env.sensor import SensorModel
+from spikecam_env.types import Masks
 
 
 @dataclass(frozen=True)
 class Case:
-    """conditions, observations: of the measurement.  base: its free refit.  bank: its statistics.
-
-    budget: what was simulated for it, by all that was made of it.  nominal_per_label: nominal radiance of 1 of the
-    labels, by which the light of `conditions` was multiplied.  settings: by which it is diagnosed.
-    """
+    """A measurement with its free refit and its statistics."""
 
     shape: tuple[int, int]
     conditions: tuple[Condition, ...]
     observations: tuple[ObservedRecording, ...]
     films: Mapping[str, FilmFeatures]
     base: BaseFit
+    """Its free refit."""
     bank: dict[StatisticKey, float]
+    """Its statistics."""
     seed: int
     jobs: int = 1
     frame_rate_hz: float = 40_000.0
     budget: Budget = field(default_factory=Budget, compare=False)
+    """Recordings simulated for it, and for all cases that were made of it."""
     nominal_per_label: float = 1.0
+    """Nominal radiance of 1 of the labels, by which the light of `conditions` was multiplied."""
     settings: DiagnosisSettings = field(default_factory=DiagnosisSettings)
 
     @property
@@ -49,15 +49,15 @@ class Case:
         return not any(c.kind in STEADY_KNOWN for c in self.conditions)
 
     def use(self, recording: str) -> str:
-        """fit or holdout."""
+        """`fit` or `holdout`."""
         return next((c.use for c in self.conditions if c.name == recording), "fit")
 
-    def to_fit(self, keys: Sequence[StatisticKey]) -> NDArray[np.bool_]:
-        """(S,) which statistics are of recordings to fit."""
+    def to_fit(self, keys: Sequence[StatisticKey]) -> Masks:
+        """(S,) whether statistics are of recordings to fit."""
         return np.array([self.use(k.recording) == "fit" for k in keys], bool)
 
-    def held_out(self, keys: Sequence[StatisticKey]) -> NDArray[np.bool_]:
-        """(S,) which statistics the gap is the mean of: those of recordings held out, or all where none is."""
+    def held_out(self, keys: Sequence[StatisticKey]) -> Masks:
+        """(S,) whether statistics count in the gap: those of recordings held out, or all where none is."""
         held = np.array([self.use(k.recording) == "holdout" for k in keys], bool)
         return held if held.any() else np.ones(len(keys), bool)
 
@@ -69,14 +69,14 @@ class Case:
 
 @dataclass(frozen=True)
 class Twin:
-    """One simulated campaign: its statistics, and its own refit where what that rests on was simulated.
-
-    pattern: statistics of the pattern of its rates, whose unit is the measured one.
-    """
+    """One simulated campaign."""
 
     bank: dict[StatisticKey, float]
+    """Its statistics."""
     base: BaseFit | None
+    """Its own refit; None where recordings that a refit rests on were not simulated."""
     pattern: dict[StatisticKey, float] = field(default_factory=dict)
+    """Statistics of the pattern of its rates, whose unit is the measured one."""
 
 
 def case_of(
@@ -103,10 +103,16 @@ def twins(
     only: Sequence[int] | None = None,
     refits: Mapping[int, BaseFit | None] | None = None,
 ) -> list[Twin]:
-    """Campaigns of the unit `base` under `model`; one number is one set of draws, whatever the model.
+    """Campaigns of a unit under a model; one number is one set of draws, whatever the model.
 
-    only: recordings to simulate, by index.  Without all of those that the refit rests on, that of `refits` stands for
-    it, by number, or the unit itself: beside an effect that bends rates, what a unit has is not what a refit sees.
+    Args:
+        case: the measurement.
+        model: its effects.
+        base: the unit.
+        numbers: of the campaigns.
+        only: recordings to simulate, by index; None: all.
+        refits: by number, for campaigns without all recordings that a refit rests on; by default the unit itself,
+            though beside an effect that bends rates a refit differs from the unit.
     """
     stands = refits or {}
 

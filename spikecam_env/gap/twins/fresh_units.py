@@ -1,4 +1,4 @@
-"""Fresh units drawn from a model: what the fixed pattern of rates should look like, and what it does."""
+"""Fresh units drawn from a model: the fixed pattern of rates to expect, and its scatter."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ SPREAD_PARAMETERS = {
     "gain": {"conversion_gain_spread": "sigma", "bias_voltage_spread": "sigma_V", "capacitor_spread": "sigma_fF"},
     "dark": {"dark_current_spread": "sigma_pA"},
 }
-"""Parameters that make pixels differ, by effect and by what of a unit differs."""
+"""Parameters that make pixels differ, by property of the unit and by effect."""
 
 
 def drawn_banks(
@@ -32,10 +32,18 @@ def drawn_banks(
     seed: int,
     limits: tuple[float, float],
 ) -> list[dict[StatisticKey, float]]:
-    """Pattern statistics of `count` units of the model, at the measured unit's mean response, dark level and noise.
+    """Pattern statistics of drawn units, at the measured unit's mean response, dark level and noise.
 
-    The model's own spreads are scaled, within `limits` times what they are, so that the whole spread is the measured
-    one.
+    The model's own spreads are scaled so that the whole spread is the measured one.
+
+    Args:
+        model: of the units.
+        base: the measured unit.
+        shown: conditions of the recordings.
+        shape: (rows, columns).
+        count: number of units.
+        seed: of the first unit.
+        limits: least and largest factor of a spread.
     """
     fitted = model
     for _ in range(2):
@@ -52,8 +60,8 @@ def _rescaled(
     limits: tuple[float, float],
 ) -> SensorModel:
     out = model
-    for what, spreads in SPREAD_PARAMETERS.items():
-        factor = spread_factor(model, what, width(getattr(base, what)[base.live]), shape, seed)
+    for part, spreads in SPREAD_PARAMETERS.items():
+        factor = spread_factor(model, part, width(getattr(base, part)[base.live]), shape, seed)
         for effect in model.effects:
             if effect.name in spreads:
                 key = spreads[effect.name]
@@ -63,13 +71,13 @@ def _rescaled(
     return out
 
 
-def spread_factor(model: SensorModel, what: str, wanted: float, shape: tuple[int, int], seed: int) -> float:
-    """By how much to multiply all spreads of `what` (gain or dark) that a model has, for a relative width `wanted`."""
+def spread_factor(model: SensorModel, part: str, wanted: float, shape: tuple[int, int], seed: int) -> float:
+    """Factor for all spreads of `part` (gain or dark) that a model has, for a relative width `wanted`."""
     rest = model
-    for name in {e.name for e in model.effects} & SPREAD_PARAMETERS[what].keys():
+    for name in {e.name for e in model.effects} & SPREAD_PARAMETERS[part].keys():
         rest = rest.without(name)
     units = [m.draw_unit(shape, seed) for m in (model, rest)]
-    whole, others = (width(getattr(unit, what)[responds(unit.gain)]) for unit in units)
+    whole, others = (width(getattr(unit, part)[responds(unit.gain)]) for unit in units)
     own = whole**2 - others**2
     return float(np.sqrt(max(wanted**2 - others**2, 0.0) / own)) if own > 1e-10 else 1.0
 
@@ -81,7 +89,7 @@ def width(values: Floats) -> float:
 
 
 def drawn_response(model: SensorModel, base: BaseFit, shape: tuple[int, int], seed: int) -> tuple[Floats, Floats]:
-    """gain, dark (P,) of a fresh unit of the model, scaled to the measured unit's medians."""
+    """(gain, dark), (P,) each, of a fresh unit of the model, scaled to the measured unit's medians."""
     unit = model.draw_unit(shape, seed)
     live, alive = base.live & (base.gain > 0), responds(unit.gain)
     gain = unit.gain * (np.median(base.gain[live]) / max(float(np.median(unit.gain[alive])), 1e-12))
@@ -106,7 +114,7 @@ def _pattern_statistics(
         phase = phases.random(rate.size)
         count = np.floor(rate * c.frames + phase)
         read = np.clip(rate * (1.0 + noise * rng.standard_normal(rate.size)), 0.0, 1.0)
-        read = np.where(count > 1, read, count / c.frames)  # as `Observation.rate`: one spike has no interval
+        read = np.where(count > 1, read, count / c.frames)  # as `ObservedRecording.rate`: one spike has no interval
         read = read_with_false_spikes(model, read, rate, phase, c.frames, false)
         for name, value in pattern.statistics(read.reshape(shape)).items():
             found[StatisticKey("pattern", c.name, name)] = value

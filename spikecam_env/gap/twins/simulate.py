@@ -30,9 +30,15 @@ def simulate(
     seed: int,
     takes: Sequence[int] | None = None,
 ) -> list[ObservedRecording]:
-    """One simulated campaign of the unit `base` under `model`; another seed is other temporal noise and phases.
+    """One simulated campaign.
 
-    takes: number of each recording, by default in order; the same number and seed give the same draws.
+    Args:
+        model: its effects.
+        base: the unit.
+        conditions: of the recordings.
+        shape: (rows, columns).
+        seed: of temporal noise and phases.
+        takes: number of each recording, by default in order; the same number and seed give the same draws.
     """
     unit = unit_from_refit(model, base, shape)
     return [
@@ -73,12 +79,16 @@ def expose(
 
 
 def with_label_error(unit: Unit, seed: int, take: int) -> Unit:
-    """A unit of identical pixels, in light and with a dark level drawn within what is known of them, for one
-    recording: light to LABELS, dark to half a grain.
+    """A unit of identical pixels with its light and dark level drawn within their errors, for one recording.
 
-    Where all pixels fire at one rate and without noise, the beat with the read-out's clock shows 1e-5 of the rate:
-    of the dark level what the sensor rounds, since it counts charge in whole grains, and of light what no label
-    says.  Drawn, it is no law.
+    Light is known to LABEL_ERROR, dark to half a grain.  Where all pixels fire at one rate and without noise, the beat
+    with the read-out's clock shows 1e-5 of the rate: the rounding of the dark level, since the sensor counts charge in
+    whole grains, and errors of labels.  Drawn, it is no law.
+
+    Args:
+        unit: any; one whose pixels differ stays as it is.
+        seed: of the campaign.
+        take: number of the recording.
     """
     if np.ptp(unit.gain) > 0:
         return unit
@@ -92,6 +102,11 @@ def with_random_phases(model: SensorModel, seed: int, take: int) -> SensorModel:
 
     Those of successive seeds are spread over the wave, two on opposite sides and four at right angles: of so few that
     were drawn at random, all may be the same, and their scatter nothing.
+
+    Args:
+        model: with or without waves.
+        seed: of the campaign.
+        take: number of the recording.
     """
     rng = np.random.default_rng(take)
     spread = int(f"{max(seed - FIRST_SEED, 0):064b}"[::-1], 2) / 2**64  # van der Corput's sequence

@@ -1,10 +1,10 @@
-"""Static scenes that nobody measured: the light that gives every pixel the rate it was seen to have.
+"""Static scenes that nobody measured: the light that gives every pixel its measured rate.
 
     L(x, y) = (rate(x, y) - dark(x, y)) / gain(x, y)        under the unit and the model to be tested
 
-Rates then say nothing; what is left to test is when spikes come: noise, neighbours, rows, drift, lines.  Every twin
-draws rates anew from what the recording leaves open (`calibration.real.plausible_rates`), and where a model bends the
-response, light is corrected until the rates come out.
+Rates then say nothing, and the test is of the times of spikes: noise, neighbours, rows, drift, lines.  Every twin
+draws rates anew within their errors (`calibration.real.plausible_rates`).  Where a model bends the response, light is
+corrected until the rates come out.
 """
 
 from __future__ import annotations
@@ -50,16 +50,14 @@ def simulate_seen(
     takes: Sequence[int],
     jobs: int = 1,
 ) -> list[ObservedRecording]:
-    """As `simulate`, with unknown scenes lit so that their pixels fire as in `seen`, `jobs` recordings at once.
-
-    Those that take longest are begun first, what moves and then what is bright: no thread waits for one at the end.
-    """
+    """As `simulate`, with unknown scenes lit so that their pixels fire as in `seen`, `jobs` recordings at once."""
 
     def one(i: int) -> ObservedRecording:
         if conditions[i].kind == "unknown":
             return simulate_scene(model, base, conditions[i], seen[i], shape, seed, takes[i])
         return simulate(model, base, [conditions[i]], shape, seed, [takes[i]])[0]
 
+    # the longest begin first, moving and then bright ones: no thread waits for one at the end
     order = sorted(range(len(conditions)), key=lambda i: (not conditions[i].moves, -seen[i].frame.sum()))
     made = dict(zip(order, at_once(one, order, jobs), strict=True))
     return [made[i] for i in range(len(conditions))]
@@ -108,9 +106,9 @@ def correction(simulated: Floats, wanted: Floats) -> Floats:
         return np.full(wanted.shape, _limited(wanted.mean() / max(float(simulated.mean()), 1e-9)))
     bins = np.clip(np.searchsorted(edges, wanted, "right") - 1, 0, edges.size - 2)
     total = np.bincount(bins, minlength=edges.size - 1)
-    there = total > 0
-    mean = np.bincount(bins, wanted)[there] / total[there]
-    got = np.bincount(bins, simulated)[there] / total[there]
+    filled = total > 0
+    mean = np.bincount(bins, wanted)[filled] / total[filled]
+    got = np.bincount(bins, simulated)[filled] / total[filled]
     return np.interp(wanted, mean, _limited(mean / np.maximum(got, 1e-9)))
 
 

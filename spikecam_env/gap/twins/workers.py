@@ -1,4 +1,4 @@
-"""The threads on which recordings are simulated: shared by all that a diagnosis tries at once."""
+"""The threads on which recordings are simulated: shared by all fits that a diagnosis runs at once."""
 
 from __future__ import annotations
 
@@ -16,9 +16,12 @@ R = TypeVar("R")
 
 
 def at_once(work: Callable[[T], R], parts: Iterable[T], jobs: int) -> list[R]:
-    """Results of `work` for each part, in order; on `jobs` threads, whoever else asks for work to be done on them.
+    """Results of `work` for each part, in order.
 
-    work: done without asking for more of it here, or threads would wait for each other.
+    Args:
+        work: must not call `at_once` itself, or threads would wait for each other.
+        parts: its arguments.
+        jobs: threads, shared with other callers.
     """
     return list(_pool(jobs, os.getpid()).map(work, parts))
 
@@ -29,8 +32,8 @@ def _pool(jobs: int, process: int) -> ThreadPoolExecutor:
     return ThreadPoolExecutor(jobs, thread_name_prefix="simulates")
 
 
-def sums_in_one_order(what: Callable[P, R]) -> Callable[P, R]:
-    """The function with linear algebra on one thread: more would add up in another order, and a last bit that differs
-    can turn what is tried next."""
-    limited: Callable[P, R] = threadpool_limits.wrap(limits=1, user_api="blas")(what)
+def sums_in_one_order(function: Callable[P, R]) -> Callable[P, R]:
+    """The function with linear algebra on one thread: more would sum in another order, and a last bit can turn the
+    search."""
+    limited: Callable[P, R] = threadpool_limits.wrap(limits=1, user_api="blas")(function)
     return limited

@@ -20,7 +20,12 @@ too, and not the pattern alone."""
 def unit_from_refit(model: SensorModel, base: BaseFit, shape: tuple[int, int]) -> Unit:
     """The unit to simulate: N of the model, and the rest of s^2 as reset noise; an s^2 below 1/N is all shot noise.
 
-    Both follow a pixel's swing, as its response lets expect it: N = N0 swing, kappa = sigma / swing.
+    Both follow a pixel's swing, estimated from its response: N = N0 swing, kappa = sigma / swing.
+
+    Args:
+        model: its effects give N and the share of bias in the pattern.
+        base: the refit.
+        shape: (rows, columns).
     """
     nominal = PixelArray.nominal(model.circuit, model.frame_rate_hz, shape)
     names = {e.name: e for e in model.effects}
@@ -44,17 +49,17 @@ def unit_from_refit(model: SensorModel, base: BaseFit, shape: tuple[int, int]) -
 
 
 def exact_refit(unit: Unit) -> BaseFit:
-    """A drawn unit in the refit's terms: what a refit without error would find."""
+    """A drawn unit in the refit's terms: the result of a refit without error."""
     white = float(np.mean((1 / unit.electrons if unit.shot else 0.0) + unit.kappa**2))
     zero = np.zeros_like(unit.gain)
     return BaseFit(unit.gain, unit.dark, zero, zero, white, np.zeros((0, unit.gain.size)), unit.gain > 0)
 
 
 def _swings(model: SensorModel, gain: Floats, shape: tuple[int, int]) -> Floats:
-    """(P,) swing of each pixel over nominal, as its response lets expect: of what makes pixels differ by the model, a
-    share is their bias, and a slow pixel is one whose swing is large, for which a millivolt is less.
+    """(P,) swing of each pixel over nominal, estimated from its response.
 
-    What all pixels of a row or column share is its offset, where the model has such, and a matter of swing alone.
+    A share of the model's spread between pixels is their bias: a slow pixel has a large swing, for which a millivolt is
+    less.  The common factor of a row or column is its offset, where the model has one, and a matter of swing alone.
     """
     usual = float(np.median(gain))
     if usual <= 0:

@@ -21,9 +21,15 @@ def false_spikes_of(model: SensorModel) -> SpuriousSpikes | None:
 def read_with_false_spikes(
     model: SensorModel, read: Floats, rate: Floats, phase: Floats, frames: int, rng: np.random.Generator
 ) -> Floats:
-    """(P,) rates as read from a recording, `read`, with the spurious spikes that a model adds.
+    """(P,) rates as read from a recording with the spurious spikes that a model adds.
 
-    rate: (P,) spikes a frame.  phase: (P,) share of an interval that had passed when the recording began.
+    Args:
+        model: with or without spurious spikes.
+        read: (P,) rates as read without them.
+        rate: (P,) spikes a frame.
+        phase: (P,) share of an interval that had passed when the recording began.
+        frames: length of the recording.
+        rng: of the spurious spikes.
     """
     spurious = false_spikes_of(model)
     if spurious is None:

@@ -28,10 +28,16 @@ other statistics where pixels saturate."""
 
 
 def inferred_unit(model: SensorModel, used: BaseFit, wanted: BaseFit, simulated: Sequence[BaseFit]) -> BaseFit:
-    """A step of indirect inference: the unit `used`, shifted by `wanted` less its twins' refits, `simulated`.
+    """A step of indirect inference: the unit shifted by the measured refit less its twins' refits.
 
     The shift of a pixel is a smooth function of its own response and dark level: pixel by pixel it would be fitted to
     the noise of these very twins.  Where most pixels of the twins are silent under a strong effect, the unit stays.
+
+    Args:
+        model: constrains the result.
+        used: the unit of the twins.
+        wanted: the measured refit.
+        simulated: the twins' refits.
     """
     live = wanted.live & (wanted.gain > 0) & np.all([s.gain > 0 for s in simulated], axis=0)
     if live.mean() < 0.5:

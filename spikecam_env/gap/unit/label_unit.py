@@ -11,15 +11,21 @@ from dataclasses import replace
 import numpy as np
 
 from spikecam_env.gap.observe.conditions import Condition
-from spikecam_env.gap.unit.refit import BaseFit
-from spikecam_env.gap.unit.usual import unusual
+from spikecam_env.gap.unit.refit import BaseFit, unusual
 
 
 def nominal_per_label(base: BaseFit, usual: float) -> float:
-    """Nominal radiance of 1 of the labels, by the refit: 1 where the median gain is within the spread of units, a
-    factor `usual`, or no pixel gets brighter in more light.
+    """Nominal radiance of 1 of the labels, by the refit.
 
-    A power of ten where that is enough: light in thousandths is then as if it had been labelled right, to the bit.
+    It is a power of ten where that is enough: light in thousandths is then as if it had been labelled right, to the
+    bit.
+
+    Args:
+        base: the refit.
+        usual: factor by which units differ.
+
+    Returns:
+        1 where the median gain is within the spread of units, or no pixel gets brighter in more light.
     """
     gain = float(np.median(base.gain[base.live])) if base.live.any() else 1.0
     if not (gain > 0 and unusual(gain, usual)):
@@ -37,7 +43,7 @@ def in_nominal_units(condition: Condition, factor: float) -> Condition:
 
 
 def label_unit_note(factor: float, base: BaseFit) -> list[str]:
-    """A note on labels whose unit is another than nominal.  base: the refit by the light that was counted anew."""
+    """A note on labels whose unit is not nominal; `base` is the refit by the light that was counted anew."""
     if factor == 1.0:
         return []
     gain = factor * float(np.median(base.gain[base.live]))

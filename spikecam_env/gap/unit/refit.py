@@ -1,8 +1,8 @@
 """The base refit: this unit's own response, dark level and jitter.
 
 A unit's parameters differ from nominal and its fixed pattern is a new draw; neither is a gap.  The free refit gives
-every pixel its own; the constrained one keeps nominal what the model has no effect for, so that it shows.  The same
-refit is made of measured and of simulated recordings.
+every pixel its own; the constrained one keeps a parameter nominal where the model has no effect for it, so
+that its difference shows.  The same refit is made of measured and of simulated recordings.
 """
 
 from __future__ import annotations
@@ -10,14 +10,13 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from spikecam_env.calibration.jitter import fit_jitter
 from spikecam_env.calibration.response import fit_lines, rates_from_times, together
 from spikecam_env.gap.observe.conditions import STEADY_KNOWN, Condition
 from spikecam_env.gap.observe.observation import DIFFERENCES, ObservedRecording
 from spikecam_env.sensor import SensorModel
-from spikecam_env.types import Floats
+from spikecam_env.types import Floats, Masks
 
 RESPONSE = ("conversion_gain_spread", "bias_voltage_spread", "capacitor_spread", "vignetting", "row_fixed_pattern",
             "column_fixed_pattern", "dead_pixels")  # fmt: skip
@@ -48,28 +47,27 @@ other recordings alone, and where the response bends it is another line."""
 
 @dataclass(frozen=True)
 class BaseFit:
-    """A unit as its recordings show it.  gain, dark: (P,) thresholds a frame at radiance 1 and in the dark.
-
-    white: s^2 = 1/N + kappa^2 a spike.  gain_sd, dark_sd: (P,) standard errors.  residual: (R, P) relative distance of
-    the static recordings' rates from the line gain L + dark, in the order given; NaN where unknown, and for pixels
-    whose line rests on other recordings than most.
-    live: (P,) pixels that respond; all where most get darker in more light, which labels are to blame for.
-    """
+    """A unit as its recordings show it."""
 
     gain: Floats
+    """(P,) thresholds a frame at radiance 1."""
     dark: Floats
+    """(P,) thresholds a frame in the dark."""
     gain_sd: Floats
+    """(P,) standard error."""
     dark_sd: Floats
+    """(P,) standard error."""
     white: float
+    """s^2 = 1/N + kappa^2 a spike."""
     residual: Floats
-    live: NDArray[np.bool_]
+    """(R, P) relative distance of the static recordings' rates from the line gain L + dark, in the order given; NaN
+    where unknown, and for pixels whose line rests on other recordings than most."""
+    live: Masks
+    """(P,) pixels that respond; all where most get darker in more light, a fault of the labels."""
 
 
 def free_refit(observations: list[ObservedRecording], conditions: list[Condition]) -> BaseFit:
-    """The free refit: every pixel its own line, from steady recordings of known light of use fit.
-
-    Where no light is known, jitter alone: each pixel's line is rate = L.
-    """
+    """Every pixel's own line, by steady recordings of known light of use fit; without known light, jitter alone."""
     static = [(o, c) for o, c in zip(observations, conditions, strict=True) if c.kind in STEADY_KNOWN]
     if not static:
         return _of_scenes([o for o, c in zip(observations, conditions, strict=True) if c.use == "fit"] or observations)
@@ -87,7 +85,7 @@ def free_refit(observations: list[ObservedRecording], conditions: list[Condition
     return BaseFit(gain, dark, np.sqrt(lines.var_gain), np.sqrt(lines.var_dark), white, residual, responds(gain))
 
 
-def responds(gain: Floats) -> NDArray[np.bool_]:
+def responds(gain: Floats) -> Masks:
     """(P,) pixels with a tenth of the usual gain; all where most get darker in more light."""
     usual = np.median(gain)
     return gain > 0.1 * usual if usual > 0 else np.ones(gain.shape, bool)
@@ -111,20 +109,24 @@ def pooled_jitter(observations: list[ObservedRecording]) -> float:
     return jitter.white if jitter else UNSEEN_JITTER
 
 
-def noisy_pixels(o: ObservedRecording) -> NDArray[np.bool_]:
-    """(P,) pixels whose A_16 is far above the others', or with irregular intervals.
+def noisy_pixels(o: ObservedRecording) -> Masks:
+    """(P,) pixels whose A_16 is far above the others', or with irregular intervals: a few would bias the noise of all.
 
-    A few pixels would bias the noise of all: one false spike in a pixel of three hundred adds half of it."""
+    One false spike in a pixel of three hundred adds half of it.
+
+    Args:
+        o: the recording.
+    """
     terms = o.times.terms[:, DIFFERENCES.index(16)]
     with np.errstate(divide="ignore", invalid="ignore"):
         relative = o.times.square[:, DIFFERENCES.index(16)] / terms * o.times.rate**2
     usual = np.nanmedian(np.where(terms > 20, relative, np.nan)) if np.any(terms > 20) else np.inf
-    out: NDArray[np.bool_] = np.where(terms > 20, relative > NOISY * usual, False) | o.irregular
+    out: Masks = np.where(terms > 20, relative > NOISY * usual, False) | o.irregular
     return out
 
 
 def constrained_refit(model: SensorModel, base: BaseFit) -> BaseFit:
-    """A free refit, constrained to what the model has effects for; the rest is nominal, or the same for all pixels."""
+    """A free refit with parameters nominal, or the same for all pixels, where the model has no effect for them."""
     names = {e.name for e in model.effects}
     gain, dark, white = base.gain, base.dark, base.white
     if not names & set(RESPONSE):
@@ -142,7 +144,16 @@ def common_level(values: Floats, errors: Floats) -> float:
     """The level of all pixels: the mean of those that differ by their errors alone where most do, else the median.
 
     Rates are read between whole frames, and those of equal pixels lie on a lattice, of which a median is one step.
+
+    Args:
+        values: (P,) levels.
+        errors: (P,) their standard errors.
     """
     middle = np.median(values)
     equal = np.abs(values - middle) <= EQUAL_WITHIN * errors
     return float(values[equal].mean()) if equal.mean() > 0.5 else float(middle)
+
+
+def unusual(ratio: float, usual: float) -> bool:
+    """Whether a ratio to nominal is beyond the spread of units, a factor `usual`: a parameter of the model is wrong."""
+    return not 1 / usual < ratio < usual

@@ -24,9 +24,14 @@ def trap_charge(traps: RandomTelegraphNoise, unit: Unit, frame_rate_hz: float) -
 
 
 def less_traps(model: SensorModel, unit: Unit, dark: Floats) -> Floats:
-    """(P,) dark levels of a refit less the traps' mean charge; left there, twice as many pixels would have it.
+    """(P,) dark levels of a refit less the traps' mean charge, since twins have traps of their own.
 
     The pixels of the highest levels are taken for those with a trap; none of them falls below the median.
+
+    Args:
+        model: with or without traps.
+        unit: whose thresholds turn charge into levels.
+        dark: (P,) levels of the refit.
     """
     traps = traps_of(model)
     if traps is None:
