@@ -1,4 +1,4 @@
-"""Made-up diagnoses over real observations: small simulated campaigns, and what a diagnosis might say of them."""
+"""Made-up diagnoses over real observations: small simulated campaigns, and possible diagnoses of them."""
 
 from __future__ import annotations
 
@@ -75,7 +75,10 @@ FEW = ("dark", "flat-050", "flat-300", "flat-200")
 def evidence(effect: str | None, *, named: bool = True, only: tuple[str, ...] = ()) -> Evidence:
     """Measured with the effect, model before without; model after with it, unless nothing was named.
 
-    only: of the recordings; else all.
+    Args:
+        effect: its name; None: no effect.
+        named: whether the model after has it.
+        only: names of recordings; else all.
     """
     kept = [i for i, c in enumerate(conditions()) if not only or c.name in only]
     shown = tuple(conditions()[i] for i in kept)
@@ -92,7 +95,7 @@ def evidence(effect: str | None, *, named: bool = True, only: tuple[str, ...] = 
 
 
 def statistics(loud: dict[str, float]) -> tuple[Statistic, ...]:
-    """A bank: quiet but for the groups in `loud`, where z reaches the figure given; what is left is quiet."""
+    """A bank: quiet but for the groups in `loud`, where z reaches the figure given; the others are quiet."""
     rng = np.random.default_rng(1)
     groups = ("rates", "noise", "intervals", "drift", "spectrum", "rows", "neighbours", "step", "moving", "pattern")
     names = [c.name for c in conditions()]

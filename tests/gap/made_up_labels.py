@@ -1,4 +1,4 @@
-"""Made-up rates on a straight line, but for one recording: what the audit says of its label."""
+"""Made-up rates on a straight line, but for one recording: the audit of its label."""
 
 from __future__ import annotations
 

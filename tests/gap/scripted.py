@@ -46,14 +46,13 @@ def law(model) -> np.ndarray:
 
 @dataclass(frozen=True, eq=False)
 class Scripted(Problem):
-    """Misfits as they are listed, one after another, and twins by a law.
-
-    predicted: fractions that were simulated.  counts: of the twins each time.
-    """
+    """Misfits as they are listed, one after another, and twins by a law."""
 
     script: object = None
     predicted: list[float] = field(default_factory=list)
+    """Fractions that were simulated."""
     counts: list[int] = field(default_factory=list)
+    """Of the twins each time."""
 
     def misfit(self, predicted=None) -> float:
         """The next of the list."""

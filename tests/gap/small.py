@@ -47,7 +47,7 @@ def effect(name: str, **parameters: float) -> Effect:
 
 @lru_cache(maxsize=1)
 def conditions() -> list[Condition]:
-    """What the small design shows."""
+    """Of the small design."""
     return planned_conditions(DESIGN, SHAPE, FRAMES)
 
 
@@ -98,7 +98,7 @@ def _observed(packed: bytes, frames: int, film: bool) -> ObservedRecording:
 
 @lru_cache(maxsize=1)
 def null() -> Null:
-    """What the model predicts for this unit, without any effect."""
+    """The model's prediction for this unit, without any effect."""
     return model_null(recorded(seed=2), MODEL, TWINS)
 
 
@@ -128,9 +128,14 @@ def quiet(count: int) -> float:
 
 
 def check_reveals(group: str, shown_by: Effect, where: str, names: Sequence[str], silent: Sequence[str] = ()) -> None:
-    """Of recording `where`, each statistic in `names` is more than CLEAR off with the effect and chance without.
+    """Statistics of a group are more than CLEAR off with an effect, and chance without.
 
-    silent: recordings, or other groups, that the effect leaves alone: nothing of them is off.
+    Args:
+        group: of the statistics.
+        shown_by: the effect.
+        where: the recording.
+        names: of the statistics.
+        silent: recordings, or other groups, that the effect leaves alone: nothing of them is off.
     """
     with_it, without = seen(recorded(shown_by)), seen(recorded(seed=5))
     for name in names:

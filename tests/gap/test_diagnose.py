@@ -207,7 +207,7 @@ def test_what_was_simulated_is_counted(only, nothing):
 
 
 def test_labels_in_another_unit_change_no_bound_and_the_page_says_so(clean, nothing, tmp_path):
-    """Light labelled in thousandths: what has no light in it is the same to the rounding of light."""
+    """Light labelled in thousandths: a bound without light in it is the same to the rounding of light."""
     folder = tmp_path / "thousandths"
     shutil.copytree(clean.folder, folder)
     for recording in clean.recordings:

@@ -30,7 +30,7 @@ SMALLER = {
 }
 """Options added to the page's, by command."""
 STRONGER = ("sag=0.004,tau_ms=40", "sag=0.02,tau_ms=10")
-"""What is hidden: a hundredth of the pixels and frames show five times as much, over a shorter recording."""
+"""The hidden effect: a hundredth of the pixels and frames show five times as much, over a shorter recording."""
 
 
 @pytest.mark.slow
@@ -79,7 +79,7 @@ def assert_the_same_from_the_cache(monkeypatch) -> None:
 
 
 def with_the_pages_code(name: str) -> None:
-    """The law in place of what was written to begin with, and its limiting case."""
+    """The page's law and limiting case in place of those of the new file."""
     Path(f"{name}.py").write_text(LAW, encoding="utf-8")
     test = Path(f"test_{name}.py")
     before, _, _ = test.read_text(encoding="utf-8").partition("def test_limiting_case")

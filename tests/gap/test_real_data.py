@@ -1,4 +1,4 @@
-"""What a diagnosis says of the real recordings, on parts of them (docs/real_data.md has the whole)."""
+"""Diagnoses of parts of the real recordings (docs/real_data.md has the whole)."""
 
 from __future__ import annotations
 

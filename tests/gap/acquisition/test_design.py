@@ -64,7 +64,7 @@ def test_light_is_stored_small(campaign) -> None:
 
 
 def test_recordings_share_the_unit_and_nothing_else(campaign) -> None:
-    """Pixel-to-pixel rates of two takes agree; what is left is read-out, not pattern.  Their spikes do not."""
+    """Pixel-to-pixel rates of two takes agree; the rest is read-out, not pattern.  Their spikes do not."""
     one, two = (r.load()[:300] for r in campaign.recordings[1:3])
     rates = [s.mean(axis=0).ravel() for s in (one, two)]
     correlation = np.corrcoef(*rates)[0, 1]

@@ -1,4 +1,4 @@
-"""Real recordings into a campaign: labels, formats, parts, and what is refused."""
+"""Real recordings into a campaign: labels, formats, parts, and refusals."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The floor of the gap: what a model without fault would leave."""
+"""The floor of the gap: the rest of a model without fault."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ def test_where_nothing_is_wrong_the_gap_is_its_floor_pattern_and_all():
 
 @pytest.mark.parametrize("halves, floor", [(0.4, 0.4), (np.nan, 1.0), (190.0, 1.0)])
 def test_halves_that_differ_by_more_than_chance_are_no_floor(halves, floor):
-    """A dark level that climbs makes them differ by what the model lacks."""
+    """A dark level that climbs makes them differ by the fault of the model."""
     gap = Gap.of(87.0, 0.5, {"dark": (87.0, 0.5)}, usable_floor(halves))
     assert gap.floor == gap.by_recording["dark"]["floor"] == floor
     assert gap.removed == pytest.approx(86.5 / (87.0 - floor))

@@ -1,4 +1,4 @@
-"""What recordings contradict about themselves, and what is no contradiction but an effect."""
+"""Contradictions within recordings, and effects that are none."""
 
 from __future__ import annotations
 
@@ -66,7 +66,7 @@ def test_spikes_that_are_missing_at_one_level_are_not_called_a_wrong_label(name)
 
 
 def test_the_brightest_label_is_not_to_blame_where_more_of_its_recording_is_off():
-    """What takes spikes of bright light alone leaves traces in their timing; a label does not."""
+    """An effect that takes spikes of bright light alone leaves traces in their timing; a label does not."""
     plain, noisy, shown = spikes_of(), spikes_of(), relabelled("flat-0.65", 0.98)
     noisy["flat-0.65"] = spikes_of(effect("frame_threshold_noise", sigma_mV=10.0))["flat-0.65"]
     for spikes, stands in ((plain, True), (noisy, False)):

@@ -51,7 +51,7 @@ SINGLE_EVENTS: list[tuple[str, dict[str, float], float]] = [
     ("afterpulsing", {"probability": 0.1}, 0.005),
     ("missed_spikes", {"probability": 0.1}, 0.125),
 ]
-"""Effect, parameters, level: what made each pixel's count vary more than an integrator's does."""
+"""Effect, parameters, level: the counts of single pixels vary more than an integrator's."""
 
 
 @pytest.mark.parametrize(("name", "parameters", "level"), SINGLE_EVENTS)
@@ -95,8 +95,8 @@ def test_stripes_that_move_are_found_along_rows_and_along_columns(turned: bool) 
 
 
 def test_a_square_is_found_where_and_when_it_is() -> None:
-    """8 x 8 pixels of + 20 %: a block of 32 frames has 4.8 + 0.8 (of the mean, which has a quarter of it) spikes of
-    variance at most 0.35, so z is 8 x 0.8 / 0.6 = 10.  Windows of 16 pixels reach 16 beyond, blocks one block."""
+    """8 x 8 pixels of + 20 %: a block of 32 frames has 4.8 spikes and 0.8 more, as the mean has a quarter of them.  The
+    variance is at most 0.35, so z is 8 x 0.8 / 0.6 = 10.  Windows of 16 pixels reach 16 beyond, blocks one block."""
     found = looked_at(SCSIM, square(8, 0.2, FRAMES), FRAMES, 0)
     assert found is not None
     print(found.text, found.contrast, found.z)

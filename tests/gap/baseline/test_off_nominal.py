@@ -89,7 +89,7 @@ def test_a_unit_as_the_model_has_it_is_not_off():
 
 @pytest.mark.parametrize("preset", ["scsim", "physical", "measured"])
 def test_any_strength_of_a_preset_may_be_patched(preset):
-    """Other parameters stay what they are, those that are true or false too."""
+    """Other parameters stay, booleans too."""
     model = SensorModel.preset(preset)
     for e in model.effects:
         key = CATALOGUE[e.name].strength

@@ -1,4 +1,4 @@
-"""What a candidate, or several at once, are asked for."""
+"""Properties of a candidate, and of several at once."""
 
 from __future__ import annotations
 

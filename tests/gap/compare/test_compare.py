@@ -1,4 +1,4 @@
-"""Distances in noise: what is chance, and what is not."""
+"""Distances in noise, and their chance."""
 
 from __future__ import annotations
 
@@ -123,8 +123,8 @@ def test_deviates_of_few_twins_are_normal(twins):
 
 
 def test_what_drawn_units_show_is_no_less_likely_than_their_number_says():
-    """Four units in forty are ten widths off: t says that it never happens, these say that one in nine does.  What none
-    of them shows, and the other side, are as they were."""
+    """Four units in forty are ten widths off: t says that it never happens, these say that one in nine does.  Distances
+    that none of them shows, and the other side, stay."""
     null = made_up(count=3)
     units = np.zeros((40, 3))
     units[:4] = 10.0
@@ -309,8 +309,8 @@ def test_a_slope_of_what_was_measured_is_told_beside_far_louder_ones_that_were_n
 
 
 def test_what_two_parameters_do_alike_is_open_between_them():
-    """Their derivatives are the same: what was known of one before (0.2) is all that is known of either, though both
-    together are told to 0.4 %."""
+    """Their derivatives are the same: each is known as well as one was before (0.2), though both together are known
+    to 0.4 %."""
     null = made_up(count=40)
     alike = np.full((40, 2), 20.0)
     _, covariance = step_of(null, np.zeros(40), exactly(np.zeros(40)), alike, before=np.array([1.0, 0.2]))

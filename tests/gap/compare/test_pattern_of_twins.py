@@ -1,4 +1,4 @@
-"""What an effect does to the pattern of rates, by its twins: moved by more than fresh units vary, it is predicted."""
+"""An effect moves the pattern of its twins' rates: where by more than fresh units vary, it is predicted."""
 
 from __future__ import annotations
 

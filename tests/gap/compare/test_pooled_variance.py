@@ -65,7 +65,7 @@ def test_a_variance_far_below_its_like_is_chance():
 
 
 def test_few_variances_make_each_other_no_surer_than_they_are():
-    """Of six recordings of one kind: the error of what they say together is part of it."""
+    """Of six recordings of one kind: the error of their mean is part of it."""
     keys, rng = [StatisticKey("spectrum", f"flat-{r}", "band 0") for r in range(6)], np.random.default_rng(8)
     found = [moderated(keys, rng.chisquare(FREEDOM, len(keys)) / FREEDOM, FREEDOM) for _ in range(400)]
     error2 = np.mean([np.log(v) ** 2 for v, _ in found])

@@ -1,4 +1,4 @@
-"""The shipped templates: what is among them, and what screening by them says of weak and severe effects."""
+"""The shipped templates, and screening by them of weak and severe effects."""
 
 from __future__ import annotations
 

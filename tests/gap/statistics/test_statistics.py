@@ -1,4 +1,4 @@
-"""The bank as a whole: what every statistic does where nothing is missing, and how exactly it can be known."""
+"""The bank as a whole: statistics where nothing is missing, and their floors."""
 
 from __future__ import annotations
 

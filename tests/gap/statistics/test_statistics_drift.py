@@ -29,11 +29,11 @@ def test_drift_reveal(shown_by, where, names, silent):
 
 
 def at(times):
-    """What is seen of pixels that all fire at these times, each some frames later than the one before it."""
+    """A recording of pixels that all fire at these times, each some frames later than the one before it."""
     spikes = np.zeros((FRAMES, SHAPE[0] * SHAPE[1]), np.uint8)
     for pixel in range(spikes.shape[1]):
-        there = np.round(times + pixel % 40).astype(int)
-        spikes[there[there < FRAMES], pixel] = 1
+        fired = np.round(times + pixel % 40).astype(int)
+        spikes[fired[fired < FRAMES], pixel] = 1
     return observe(pack_frames(spikes.reshape(FRAMES, *SHAPE)), SHAPE)
 
 

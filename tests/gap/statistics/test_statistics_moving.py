@@ -1,4 +1,4 @@
-"""Moving light: what is left of the film."""
+"""Moving light: the rest of the film."""
 
 from __future__ import annotations
 

@@ -33,7 +33,7 @@ def test_strongest_line_is_at_its_cycles(cycles):
 
 def test_where_power_rises_steeply_there_is_no_line():
     """A thousandfold, where dim pixels' own rates begin: at first in three bins of five, 25 bins on in all.  The first
-    of them is far above the median of both sides together, and no more than chance above what comes after it.  A line
+    of them is far above the median of both sides together, and above those after it by chance only.  A line
     within the rise, above all that follows, is one."""
     cycles = np.arange(4001)
     strong = (cycles >= 625) | ((cycles >= 600) & (cycles % 5 < 3))

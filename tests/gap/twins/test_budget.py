@@ -1,4 +1,4 @@
-"""What is not begun once enough has been simulated, and that it is said."""
+"""Steps that are skipped once enough has been simulated, and their notes."""
 
 from __future__ import annotations
 
@@ -151,7 +151,7 @@ def test_bends_that_cancel_are_looked_for_while_effort_is_left(spent: int, monke
 
 @dataclass(frozen=True)
 class Found:
-    """What of a round is asked here."""
+    """The fits of a round."""
 
     fits: tuple[SimpleNamespace, ...]
 

@@ -66,8 +66,8 @@ def test_alike_pixels_are_known_no_better_than_labels_say_and_the_sensor_counts(
 
 @pytest.mark.parametrize("known", [0.0, LABEL_ERROR])
 def test_the_beat_of_alike_pixels_is_no_surer_than_labels(known: float, monkeypatch):
-    """64 intervals of 30.1222 frames: a light brighter by what labels leave open moves the mean square of their second
-    differences by hundreds of what twins in one light scatter; drawn, it is within their scatter."""
+    """64 intervals of 30.1222 frames: a light brighter by the error of labels moves the mean square of their second
+    differences by hundreds of the scatter of twins in one light; drawn, it is within their scatter."""
     monkeypatch.setattr(twin, "LABEL_ERROR", known)
     light = Keyframes(np.zeros(1), np.full((1, *SHAPE), 0.029, np.float32))
     flat, model = Condition("flat", "flat", 0.029, light, 8000, "fit"), SensorModel.preset("ideal")

@@ -1,4 +1,4 @@
-"""Static scenes that nobody measured: light from the pixels' own rates, and what can be tested in it."""
+"""Static scenes that nobody measured: light from the pixels' own rates, and the tests that are left."""
 
 from __future__ import annotations
 

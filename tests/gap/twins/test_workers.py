@@ -1,4 +1,4 @@
-"""What runs on which threads."""
+"""Threads of linear algebra during a diagnosis."""
 
 from __future__ import annotations
 

@@ -12,7 +12,7 @@ from spikecam_env.gap.unit.indirect_inference import extrapolated_unit, gain_cha
 
 
 def test_a_unit_is_inferred_along_a_line_and_not_to_the_noise_of_each_pixel():
-    """Refits 1 % low at the dimmest pixel to 3 % at the brightest, each with 0.5 % of noise of its own: what is left of
+    """Refits 1 % low at the dimmest pixel to 3 % at the brightest, each with 0.5 % of noise of its own: the rest of
     the noise is that of a line through 1024 pixels, at its ends some 4 sigma / sqrt(n)."""
     base = unit()
     x = (base.gain - base.gain.min()) / np.ptp(base.gain)

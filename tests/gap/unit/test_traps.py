@@ -1,4 +1,4 @@
-"""What traps add to the mean level of their pixels: in a drawn unit, and not twice in a refitted one."""
+"""The charge of traps in the mean level of their pixels: in a drawn unit, and not twice in a refitted one."""
 
 from __future__ import annotations
 
