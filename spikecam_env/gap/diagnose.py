@@ -32,7 +32,8 @@ from spikecam_env.gap.fit.problem import Problem
 from spikecam_env.gap.fit.simulated_templates import own_templates
 from spikecam_env.gap.fit.standard_templates import templates_of
 from spikecam_env.gap.maps import diagnose_maps
-from spikecam_env.gap.observe.conditions import STEADY_KNOWN, Condition, condition_of, observe_all
+from spikecam_env.gap.observe.conditions import STEADY_KNOWN, Condition, condition_of
+from spikecam_env.gap.observe.observation import observe
 from spikecam_env.gap.report.evidence import evidence_for
 from spikecam_env.gap.report.sentence import BOUNDS_OF_MAPS, sentence, unbounded, unfinished
 from spikecam_env.gap.result import BOUNDED_VERDICTS, Bound, Conclusion, Diagnosis, Findings
@@ -231,7 +232,8 @@ def observed(campaign: Campaign) -> Observed:
             f"{campaign.folder} has fewer than two static recordings of known light to refit the unit by (two of use "
             "fit are needed, or unknown static scenes and nothing else)"
         )
-    seen = tuple(o for o in observe_all(part, conditions) if o is not None)
+    both = zip(part.recordings, conditions, strict=True)
+    seen = tuple(observe(r.packed(), part.shape, film=c.moves, static=c.static) for r, c in both)
     return Observed(part.recordings, tuple(conditions), seen)
 
 

@@ -1,4 +1,4 @@
-"""A campaign in the diagnosis: the light of every recording, and its observation.
+"""The light of every recording of a campaign, and its kind.
 
 Kinds of light: `dark`, `flat` (uniform and steady), `picture` (steady), `step` (uniform, changes in time), `moving`,
 `unknown` (a static scene that nobody measured) and `rates` (no spikes, only the rates of pixels).
@@ -11,11 +11,9 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from tqdm import tqdm
 
-from spikecam_env.campaign.reading import Campaign, CampaignRecording
+from spikecam_env.campaign.reading import CampaignRecording
 from spikecam_env.gap.acquisition.recording_kinds import Planned
-from spikecam_env.gap.observe.observation import ObservedRecording, observe
 from spikecam_env.sensor import Keyframes
 from spikecam_env.types import Masks
 
@@ -87,11 +85,3 @@ def _condition(name: str, light: Keyframes, frames: int, use: str, v_d: float | 
     else:
         kind = "step" if uniform else "moving"
     return Condition(name, kind, level, light, frames, use, v_d)
-
-
-def observe_all(
-    campaign: Campaign, conditions: list[Condition], *, progress: bool = False
-) -> list[ObservedRecording | None]:
-    """Every recording of spikes in numbers; None for those that are rates only."""
-    bar = tqdm(zip(campaign.recordings, conditions, strict=True), "read", len(conditions), disable=not progress)
-    return [observe(r.packed(), campaign.shape, film=c.moves, static=c.static) if r.spikes else None for r, c in bar]

@@ -5,9 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import NamedTuple
 
-import numpy as np
-from numpy.typing import NDArray
-
 from spikecam_env.gap.observe.conditions import LABEL_ERROR
 from spikecam_env.gap.statistics import (
     clock,
@@ -103,12 +100,6 @@ def pattern_bank(reading: CampaignReading) -> dict[StatisticKey, float]:
             for name, value in pattern.statistics(o.rate.reshape(o.shape)).items():
                 found[StatisticKey("pattern", condition.name, name)] = value
     return found
-
-
-def aligned(banks: list[dict[StatisticKey, float]]) -> tuple[list[StatisticKey], NDArray[np.float64]]:
-    """Statistics that every bank has, and their values (B, S)."""
-    keys = [k for k in banks[0] if all(k in b for b in banks[1:])]
-    return keys, np.array([[b[k] for k in keys] for b in banks])
 
 
 __getattr__ = old_names(__name__, {"Key": "StatisticKey"})

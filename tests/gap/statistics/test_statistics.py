@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 from small import null, quiet, recorded, seen, summary
 
-from spikecam_env.gap.statistics import GROUPS, StatisticKey, aligned, floor_of
+from spikecam_env.gap.statistics import GROUPS, StatisticKey, floor_of
 
 
 @pytest.mark.parametrize("seed", [5, 6, 7])
@@ -32,9 +32,3 @@ def test_floor_is_that_of_the_longest_name_that_fits():
     assert floor_of(StatisticKey("rates", "flat", "scatter")) == 0.05
     assert floor_of(StatisticKey("rates", "flat", "level")) == 2e-5
     assert floor_of(StatisticKey("another", "flat", "level")) == 0.0
-
-
-def test_aligned_keeps_what_every_bank_has():
-    a, b = StatisticKey("rates", "flat", "a"), StatisticKey("rates", "flat", "b")
-    keys, values = aligned([{a: 1.0, b: 2.0}, {a: 3.0}])
-    assert keys == [a] and values.tolist() == [[1.0], [3.0]]
