@@ -83,16 +83,29 @@ def _scan(
         for within in range(64):
             pixel = 64 * column + within
             n = times_of(bits[within], times)
-            ends[pixel, 0] = n
-            if n == 0:
-                continue
-            ends[pixel, 1] = times[0]
-            ends[pixel, 2] = times[n - 1]
-            for i in range(ks.size):
-                k = ks[i]
-                if n > 2 * k:
-                    square[pixel, i] = second_differences(times, n, k)
-                    terms[pixel, i] = n - 2 * k
+            fill_ends_and_differences(times, n, ks, ends[pixel], square[pixel], terms[pixel])
+
+
+@njit(cache=True, nogil=True, boundscheck=False)
+def fill_ends_and_differences(
+    t: NDArray[np.int32],
+    n: int,
+    ks: NDArray[np.int64],
+    ends: NDArray[np.int64],
+    square: NDArray[np.float64],
+    terms: NDArray[np.int64],
+) -> None:
+    """Fill a pixel's ends (count, first, last), and sums and numbers (K,) of its second differences, from the n spike
+    times at the start of t."""
+    ends[0] = n
+    if n == 0:
+        return
+    ends[1], ends[2] = t[0], t[n - 1]
+    for i in range(ks.size):
+        k = ks[i]
+        if n > 2 * k:
+            square[i] = second_differences(t, n, k)
+            terms[i] = n - 2 * k
 
 
 @njit(cache=True, nogil=True, fastmath={"reassoc"})

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from spikecam_env.calibration.spike_times import second_differences
+from spikecam_env.calibration.spike_times import fill_ends_and_differences
 from spikecam_env.compiled import njit
 from spikecam_env.streams.bits import by_pixel, ones, times_of
 
@@ -49,20 +49,14 @@ def through_pixels(
             if p >= ends.shape[0]:
                 break
             n = times_of(bits[within], t)
-            ends[p, 0] = n
+            fill_ends_and_differences(t, n, steps, ends[p], square[p], terms[p])
             if n == 0:
                 continue
-            ends[p, 1], ends[p, 2] = t[0], t[n - 1]
             i = 0
             for b in range(blocks.shape[0]):
                 start, stop = i, min((b + 1) * block, frames)
                 i = np.searchsorted(t[:n], stop)
                 blocks[b, p] = i - start
-            for j in range(steps.size):
-                k = steps[j]
-                if n > 2 * k:
-                    square[p, j] = second_differences(t, n, k)
-                    terms[p, j] = n - 2 * k
             if n < 2:
                 continue
             least, most = np.int32(frames), np.int32(0)
