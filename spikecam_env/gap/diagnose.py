@@ -25,7 +25,7 @@ from spikecam_env.gap.baseline.label_audit import audit, upheld
 from spikecam_env.gap.baseline.missing_from_refit import missing_effects, with_missing
 from spikecam_env.gap.baseline.null_model import model_null
 from spikecam_env.gap.baseline.off_nominal import OffNominal, off_nominal
-from spikecam_env.gap.baseline.static_part import Observed, looked_at, without_motion
+from spikecam_env.gap.baseline.static_part import Observed, counted_pixels, without_motion
 from spikecam_env.gap.candidates.table import chosen, testable
 from spikecam_env.gap.compare.prediction import values_of
 from spikecam_env.gap.fit.problem import Problem
@@ -237,12 +237,14 @@ def observed(campaign: Campaign) -> Observed:
     return Observed(part.recordings, tuple(conditions), seen)
 
 
-def case_of_observed(campaign: Campaign, all_seen: Observed, seed: int, jobs: int, settings: DiagnosisSettings) -> Case:
+def case_of_observed(
+    campaign: Campaign, recordings: Observed, seed: int, jobs: int, settings: DiagnosisSettings
+) -> Case:
     """Refit the unit by the recordings; labels in another unit are counted anew."""
-    seen = all_seen.seen
+    seen = recordings.observations
     conditions = [
-        replace(c, level=float(o.rate[looked_at(c)].mean())) if c.kind == "unknown" else c
-        for c, o in zip(all_seen.conditions, seen, strict=True)
+        replace(c, level=float(o.rate[counted_pixels(c)].mean())) if c.kind == "unknown" else c
+        for c, o in zip(recordings.conditions, seen, strict=True)
     ]
     case = case_of(campaign.shape, conditions, seen, seed, jobs, campaign.frame_rate_hz)
     case = replace(case, settings=settings)

@@ -48,7 +48,7 @@ def test_the_helicopter_moves_and_the_wall_does_not(
 ) -> None:
     made = import_campaign(REAL, tmp_path / "made", [Label(file, "unknown")], frame_rate_hz=20_000.0, **part)
     seen = observed(made)
-    found = find_motion(seen.conditions[0], seen.seen[0])
+    found = find_motion(seen.conditions[0], seen.observations[0])
     print(found.text if found else f"{file} stands still")
     assert (found is not None) == moves
 

@@ -5,13 +5,13 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from spikecam_env.campaign.reading import CampaignRecording
 from spikecam_env.gap.baseline.motion import DetectedMotion, find_motion
 from spikecam_env.gap.observe.conditions import Condition
 from spikecam_env.gap.observe.observation import ObservedRecording, observe
 from spikecam_env.gap.settings import DiagnosisSettings
+from spikecam_env.types import Masks
 
 ENOUGH_STATIC = 0.3
 """Share of static pixels that is enough to look at them alone."""
@@ -23,7 +23,7 @@ class Observed:
 
     recordings: tuple[CampaignRecording, ...]
     conditions: tuple[Condition, ...]
-    seen: tuple[ObservedRecording, ...]
+    observations: tuple[ObservedRecording, ...]
 
 
 def without_motion(
@@ -42,7 +42,7 @@ def without_motion(
         (recordings, motion).  There are no recordings where motion cannot be left out: without `static_only`, where
         light said to be known changes, or where too few pixels are static.
     """
-    both = zip(observed.conditions, observed.seen, strict=True)
+    both = zip(observed.conditions, observed.observations, strict=True)
     motion = tuple(m for c, o in both if (m := find_motion(c, o, settings)))
     if not motion:
         return observed, ()
@@ -53,16 +53,16 @@ def without_motion(
     conditions = [replace(c, static=static) if c.kind == "unknown" else c for c in observed.conditions]
     seen = [
         o if c.static is None else observe(r.packed(), o.shape, static=c.static)
-        for r, c, o in zip(observed.recordings, conditions, observed.seen, strict=True)
+        for r, c, o in zip(observed.recordings, conditions, observed.observations, strict=True)
     ]
     return Observed(observed.recordings, tuple(conditions), tuple(seen)), motion
 
 
-def static_pixels(motion: tuple[DetectedMotion, ...]) -> NDArray[np.bool_]:
+def static_pixels(motion: tuple[DetectedMotion, ...]) -> Masks:
     """(H, W) bool: pixels that move in none of the recordings."""
     return np.asarray(~np.logical_or.reduce([m.moving for m in motion]))
 
 
-def looked_at(condition: Condition) -> NDArray[np.bool_] | slice:
+def counted_pixels(condition: Condition) -> Masks | slice:
     """Index of the pixels of a recording that count, of (P,)."""
     return slice(None) if condition.static is None else condition.static.reshape(-1)

@@ -75,12 +75,12 @@ def simulate_scene(
     """One recording of an unknown scene, lit so that its pixels fire as in `seen`."""
     wanted = plausible_true_rates(seen, base.white, np.random.default_rng([seed, take]))
     light = np.minimum(np.maximum(wanted - base.dark, 0.0) / np.maximum(base.gain, 1e-9), BRIGHTEST)
-    looked_at = np.ones(light.shape, bool) if scene.static is None else scene.static.reshape(-1)
+    counted = np.ones(light.shape, bool) if scene.static is None else scene.static.reshape(-1)
     for turn in range(_MOST_CORRECTIONS):
         lit = replace(scene, light=Keyframes(np.zeros(1), light.reshape(1, *shape).astype(np.float32)))
         [twin] = simulate(model, base, [lit], shape, seed, [take])
         factor = np.ones_like(light)
-        factor[looked_at] = correction(twin.rate[looked_at], wanted[looked_at])
+        factor[counted] = correction(twin.rate[counted], wanted[counted])
         if turn == _MOST_CORRECTIONS - 1 or np.abs(factor - 1.0).max() < RATE_TOLERANCE:
             break
         light = np.minimum(light * factor, BRIGHTEST)

@@ -106,7 +106,7 @@ def test_three_tenths_of_the_pixels_have_to_be_static(
     recording = SimpleNamespace(packed=lambda: None)
     seen_before = Observed((recording,), (SCENE,), (SimpleNamespace(shape=SHAPE),))
     seen, _ = without_motion(seen_before, static_only=True, settings=DiagnosisSettings())
-    assert [mask.mean() == pytest.approx(share, abs=1e-3) for mask in seen.seen] == [True] * kept
+    assert [mask.mean() == pytest.approx(share, abs=1e-3) for mask in seen.observations] == [True] * kept
 
 
 def scatter(level: NDArray[np.float64], noisy: NDArray[np.bool_], seed: int = 0) -> NDArray[np.float64]:
