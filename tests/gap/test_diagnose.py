@@ -120,7 +120,7 @@ def test_the_gap_of_nothing_is_chance(nothing):
     assert nothing.gap.before == nothing.gap.after
 
 
-def test_bounds_are_simulated_only_where_they_are_asked_for(clean, nothing, tmp_path):
+def test_bounds_are_simulated_on_request_only(clean, nothing, tmp_path):
     """Without them the answer is the same, costs no twin more than the null model's, and says how to have them."""
     quick = asked(clean, candidates=BOUNDED)
     quick.write(tmp_path)
@@ -143,7 +143,7 @@ def test_a_wrong_label_is_the_datas_fault(clean, tmp_path):
     assert found.to_json()["data"] == list(found.data)
 
 
-def test_what_shows_in_nothing_but_motion_held_out_is_found_and_not_called_a_check(tmp_path):
+def test_an_effect_in_held_out_motion_alone_is_found_and_its_gap_is_no_check(tmp_path):
     design = [r for r in DESIGN if not isinstance(r, (Step, Bars))] + [Bars(high=1.4, period=16.0, use="holdout")]
     found = asked(written(tmp_path / "held", MODEL.with_effect(LAG), design), candidates=ONLY)
     assert found.verdict == "named" and [e.name for e in found.effects] == ["photodiode_lag"]
@@ -151,7 +151,7 @@ def test_what_shows_in_nothing_but_motion_held_out_is_found_and_not_called_a_che
     assert Note.ONLY_HELD_OUT_DISAGREE in found.data and "which were fitted too" in found.sentence
 
 
-def test_so_it_is_beside_an_effect_that_the_others_have_shown(tmp_path):
+def test_an_effect_in_held_out_motion_alone_is_found_beside_one_of_the_others(tmp_path):
     design = [r for r in DESIGN if not isinstance(r, (Step, Bars))] + [Bars(high=1.4, period=16.0, use="holdout")]
     both = MODEL.with_effect(LAG).with_effect(effect("dead_time", tau_us=0.5))
     found = asked(written(tmp_path / "held", both, design), candidates=("dead_time", ONLY[0]))
@@ -199,7 +199,7 @@ def test_the_same_seed_gives_the_same_answer_by_any_number_of_threads(lagging, o
     assert again.to_json() | {"stages_s": 0, "elapsed_s": 0} == only.to_json() | {"stages_s": 0, "elapsed_s": 0}
 
 
-def test_what_was_simulated_is_counted(only, nothing):
+def test_simulated_recordings_are_counted(only, nothing):
     assert min(only.simulated, nothing.simulated) >= FEW * len(DESIGN)
     assert not any("Skipped" in note for note in only.data), "the default is enough for one effect"
     assert "--effort" not in command_of(only)
@@ -249,7 +249,7 @@ def test_only_candidates_are_tried(only):
     assert [e.name for e in only.effects] == ["photodiode_lag"] and only.candidates == ONLY
 
 
-def test_what_a_campaign_cannot_show_is_said_with_what_it_needs(tmp_path):
+def test_effects_that_a_campaign_cannot_show_are_listed_with_their_needs(tmp_path):
     still = tuple(p for p in DESIGN if not isinstance(p, Step | Bars))
     found = asked(written(tmp_path, MODEL, still), candidates=(*MOVED, "vignetting"), bounds=True)
     needs = dict(found.not_testable)

@@ -92,7 +92,7 @@ def test_settings_that_are_none_are_refused_in_one_line(
 
 
 @pytest.mark.parametrize("verdict", sorted(made_up.EVERY))
-def test_a_terminal_is_told_the_verdict_and_what_was_found(verdict: str) -> None:
+def test_a_terminal_shows_the_verdict_and_the_effects(verdict: str) -> None:
     d = made_up.EVERY[verdict]()
     printed = summary(d)
     assert printed.startswith(f"{verdict}: {d.sentence}")
@@ -118,7 +118,7 @@ def test_a_terminal_is_told_the_verdict_and_what_was_found(verdict: str) -> None
         (["--effort", "0"], "--effort 0"),
     ],
 )
-def test_what_is_wrong_ends_in_one_line(options, message: str, campaign: Path, tmp_path: Path, capsys) -> None:
+def test_a_wrong_option_ends_in_one_line(options, message: str, campaign: Path, tmp_path: Path, capsys) -> None:
     assert run(["diagnose", str(campaign), "--out", str(tmp_path / "out"), *options]) == 2
     error = capsys.readouterr().err
     assert error.startswith("spikecam: ") and error.count("\n") == 1

@@ -51,7 +51,7 @@ def test_the_command_climbs_it_and_says_where_its_files_are(tmp_path: Path, caps
     assert {p.name for p in (tmp_path / "out").iterdir()} == {"ladder.json", "ladder.png", "model.toml"}
 
 
-def test_labels_in_another_unit_are_said_as_a_diagnosis_says_them(tmp_path: Path, capsys) -> None:
+def test_labels_in_another_unit_have_the_note_of_a_diagnosis(tmp_path: Path, capsys) -> None:
     """Light labelled in thousandths: the note of `diagnose`, word for word."""
     recordings = [Dark(), *(Flat(radiance=x) for x in (0.1, 0.3))]
     folder = tmp_path / "c"

@@ -150,8 +150,8 @@ class _Part:
             if span is None or size == 1:
                 continue
             if not 0 <= span[0] < span[1] <= size:
-                what = "rows" if axis == -2 else "columns"
-                raise InputError(f"{what} {span[0]} to {span[1]} asked of {name}, which has {size}")
+                lines = "rows" if axis == -2 else "columns"
+                raise InputError(f"{lines} {span[0]} to {span[1]} of {name}, which has {size}")
             array = array[..., slice(*span), :] if axis == -2 else array[..., slice(*span)]
         return array
 

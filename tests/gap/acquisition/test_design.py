@@ -162,7 +162,7 @@ def test_a_folder_of_something_else_is_left_alone(finished: bool, tmp_path: Path
         ({"engine": "slow"}, "unknown engine 'slow'"),
     ],
 )
-def test_what_cannot_be_recorded_is_refused_before_a_recording(changed, message: str, tmp_path: Path) -> None:
+def test_an_impossible_design_is_refused_before_a_recording(changed, message: str, tmp_path: Path) -> None:
     settings = {"model": MODEL, "shape": (8, 8), "frames": 50, "recordings": (Dark(),)} | changed
     with pytest.raises(InputError, match=message):
         write_campaign(tmp_path / "bad", **settings)

@@ -118,7 +118,7 @@ def folder_label(file: str, radiance="0.3", **options) -> Label:
         ([folder_label("up.dat"), folder_label("up.dat")], {}, "two recordings would be named 'up'"),
         ([folder_label("up.dat", use="train")], {}, "choose one of fit, holdout"),
         ([folder_label("up.dat", "relative")], {}, "`relative` is for flat maps"),
-        ([folder_label("up.dat")], {"rows": (5, 50)}, "rows 5 to 50 asked of up.dat, which has 10"),
+        ([folder_label("up.dat")], {"rows": (5, 50)}, "rows 5 to 50 of up.dat, which has 10"),
         ([folder_label("up.dat")], {"holdout_share": 1.0}, "holdout_share = 1.0"),
         ([folder_label("up.dat")], {"colour": 3}, "unknown reading option 'colour'"),
         ([folder_label("up.dat")], {"frame_rate_hz": None}, "do not say their frame rate"),

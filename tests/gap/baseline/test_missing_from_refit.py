@@ -108,12 +108,12 @@ def test_dark_levels_that_are_not_known_alike_are_no_spread():
     assert found == ["dark_current"]
 
 
-def test_only_names_that_are_asked_for_are_added():
+def test_only_candidates_are_added():
     found = lacking(SensorModel.preset("scsim"), names=("dark_current", "shot_noise"))
     assert list(found) == ["dark_current", "shot_noise"]
 
 
-def test_what_one_voltage_cannot_tell_apart_is_said():
+def test_effects_that_one_voltage_does_not_separate_are_listed():
     found = lacking(SensorModel.preset("scsim"))
     assert set(found["conversion_gain_spread"].also) == {"bias_voltage_spread", "capacitor_spread"}
     assert "reset_noise" in found["shot_noise"].also

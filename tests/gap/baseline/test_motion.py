@@ -114,7 +114,7 @@ def test_a_ball_that_crosses_and_a_slow_drift_are_found() -> None:
     assert slow.share > 0.3
 
 
-def test_what_all_pixels_do_by_their_level_is_taken_out() -> None:
+def test_a_change_of_all_pixels_by_their_level_is_taken_out() -> None:
     """A lamp 20 % brighter and a dark level higher by one: the parabola has both, whatever a tenth of pixels does."""
     mean = np.linspace(2.0, 20.0, 400)
     counts = 1.2 * mean + 1.0

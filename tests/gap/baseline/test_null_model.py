@@ -10,7 +10,7 @@ from spikecam_env.gap.compare.prediction import Draw, Null
 from spikecam_env.gap.statistics import StatisticKey
 
 
-def test_recordings_in_motion_are_told_by_twice_as_many_twins_and_the_pattern_by_drawn_units():
+def test_recordings_in_motion_have_twice_as_many_twins_and_the_pattern_has_drawn_units():
     there = null()
     moving = np.array([k.recording in ("step", "bars") for k in there.keys])
     pattern = np.array([k.group == "pattern" for k in there.keys])

@@ -26,12 +26,12 @@ def test_a_candidate_knows_its_name():
         (("readout_skew", "crosstalk"), False, False, False),
     ],
 )
-def test_several_are_asked_what_any_or_all_of_them_are(names, any_pattern, all_pattern, only_contrast):
+def test_several_have_properties_of_any_or_all(names, any_pattern, all_pattern, only_contrast):
     group = Candidates(names)
     assert (group.any_pattern, group.all_pattern, group.only_contrast) == (any_pattern, all_pattern, only_contrast)
 
 
-def test_what_bends_the_response_is_of_two_families():
+def test_effects_that_bend_the_response_are_of_two_families():
     bending = {name for name in CATALOGUE if candidate(name).bends_response}
     assert {"dead_time", "photo_response_nonlinearity", "incomplete_reset"} < bending
     assert not bending & {"crosstalk", "photodiode_lag", "shot_noise"}

@@ -64,7 +64,7 @@ def test_adjusted_p_values_are_at_most_one_and_small_ones_keep_their_order():
 
 
 @pytest.mark.parametrize("twins", [4, 8, 12])
-def test_false_alarms_are_as_often_as_asked_for_however_few_the_twins(twins):
+def test_false_alarms_have_their_nominal_rate_however_few_the_twins(twins):
     """1500 campaigns of 20 statistics, alarm at 5 %: 5 -+ 4 sqrt(0.05 * 0.95 / 1500) % at most."""
     rng = np.random.default_rng(twins)
     alarms = 0
@@ -98,7 +98,7 @@ def test_an_effect_that_scatters_is_not_held_against_its_own_few_twins(twins, re
     assert share < allowed < as_the_nulls / 300
 
 
-def test_what_an_effect_leaves_as_it_was_is_known_as_well_as_the_nulls():
+def test_statistics_that_an_effect_leaves_are_known_as_well_as_the_nulls():
     """Twins that scatter as the null's keep its degrees of freedom; one that scatters more takes its group with it."""
     null = replace(made_up(count=4), keys=tuple(StatisticKey("ab"[i > 1], "r", str(i)) for i in range(4)))
     draws = tuple(Draw(n, np.zeros(4), None) for n in range(3))
@@ -122,7 +122,7 @@ def test_deviates_of_few_twins_are_normal(twins):
     assert distance < 1.95 / np.sqrt(20_000)
 
 
-def test_what_drawn_units_show_is_no_less_likely_than_their_number_says():
+def test_a_distance_that_drawn_units_show_is_as_likely_as_their_share():
     """Four units in forty are ten widths off: t says that it never happens, these say that one in nine does.  Distances
     that none of them shows, and the other side, stay."""
     null = made_up(count=3)
@@ -235,7 +235,7 @@ def test_the_noise_of_a_twin_cancels_against_the_nulls_of_the_same_draws():
     assert of_rates.error**2 == pytest.approx(null.sd**2 / 12 + (PAIR_NOISE["rates"] * null.sd) ** 2)
 
 
-def test_what_was_not_simulated_is_the_nulls_and_is_known_as_well():
+def test_statistics_without_a_simulation_are_the_nulls_and_known_as_well():
     null = drawn(count=4)
     found = paired(null, [Draw(3, np.array([np.nan, 5.0, np.nan, 5.0]), None)])
     assert found.mean[[0, 2]].tolist() == null.mean[[0, 2]].tolist()
@@ -276,14 +276,14 @@ def test_far_off_a_step_goes_where_most_point_and_not_where_few_agree_already(ag
     assert found[0] == pytest.approx(step, abs=0.05)
 
 
-def test_what_is_chance_in_each_recording_may_be_none_in_all():
+def test_chance_in_each_recording_may_be_none_in_all():
     keys = [StatisticKey("intervals", f"r{i}", name) for i in range(9) for name in ("short", "long")]
     z = np.array([2.0 if k.name == "short" else 0.0 for k in keys])
     assert of_all_recordings(keys, z, "intervals") == pytest.approx([6.0, 0.0])
     assert of_all_recordings(keys, z, "noise").size == 0
 
 
-def test_a_slope_is_told_by_what_clearly_moves():
+def test_a_slope_is_known_by_statistics_that_clearly_move():
     """5 of 500 statistics move by 20 noises of their own: the others say nothing, instead of noise over the step."""
     rng = np.random.default_rng(0)
     null = made_up(count=500)
@@ -295,7 +295,7 @@ def test_a_slope_is_told_by_what_clearly_moves():
     assert list(np.flatnonzero(slope)) == [0, 1, 2, 3, 4] and slope[:5] == pytest.approx(np.full(5, 200.0), rel=0.2)
 
 
-def test_a_slope_of_what_was_measured_is_told_beside_far_louder_ones_that_were_not():
+def test_a_slope_of_measured_statistics_is_known_beside_far_louder_ones_that_were_not():
     """A blur that moves bars by 8 noises and the disk, held out, by 200: of the fit it has a slope, and an error."""
     null = made_up(count=20)
     moves = np.where(np.arange(20) < 2, 200.0, np.where(np.arange(20) < 6, 8.0, 0.0))
@@ -308,7 +308,7 @@ def test_a_slope_of_what_was_measured_is_told_beside_far_louder_ones_that_were_n
     assert list(slope) == list(moves) and 0.03 < np.sqrt(covariance[0, 0]) < 0.3
 
 
-def test_what_two_parameters_do_alike_is_open_between_them():
+def test_parameters_that_do_the_same_are_open_between_each_other():
     """Their derivatives are the same: each is known as well as one was before (0.2), though both together are known
     to 0.4 %."""
     null = made_up(count=40)

@@ -15,7 +15,7 @@ def drawn(true, seed):
     return true * np.random.default_rng(seed).chisquare(FREEDOM, len(true)) / FREEDOM
 
 
-def test_what_is_alike_in_all_recordings_is_known_much_better():
+def test_variances_alike_in_all_recordings_are_known_much_better():
     true = np.repeat(np.geomspace(1.0, 50.0, 8), 10)
     made = drawn(true, 0)
     found, freedom = moderated(KEYS, made, FREEDOM)
@@ -24,7 +24,7 @@ def test_what_is_alike_in_all_recordings_is_known_much_better():
     assert abs(np.mean(np.log(found / true))) < 0.1
 
 
-def test_what_differs_by_recording_alone_is_known_better():
+def test_variances_that_differ_by_recording_alone_are_known_better():
     """Coincidences scatter as one over their number, which is a recording's."""
     of_band, of_flat = np.geomspace(1.0, 50.0, 8), np.geomspace(1.0, 1e-4, 10)
     true = np.outer(of_band, of_flat).ravel()
@@ -35,7 +35,7 @@ def test_what_differs_by_recording_alone_is_known_better():
     assert abs(np.mean(np.log(found / true))) < 0.1
 
 
-def test_what_differs_keeps_its_own():
+def test_variances_that_differ_stay():
     rng = np.random.default_rng(1)
     true = np.exp(2.0 * rng.standard_normal(len(KEYS)))
     made = drawn(true, 2)
@@ -46,7 +46,7 @@ def test_what_differs_keeps_its_own():
 
 @pytest.mark.parametrize("of_recording", [0.0, 2.0])
 @pytest.mark.parametrize("apart", [0.2, 0.5, 1.0])
-def test_what_is_said_of_a_variance_is_as_sure_as_it_says(apart, of_recording):
+def test_the_stated_freedom_of_a_variance_is_that_of_its_error(apart, of_recording):
     """The logarithm's error is that of a sample variance with the degrees of freedom stated."""
     keys = [StatisticKey("spectrum", f"flat-{r}", f"band {n}") for n in range(50) for r in range(40)]
     rng = np.random.default_rng(3)
@@ -73,7 +73,7 @@ def test_few_variances_make_each_other_no_surer_than_they_are():
     assert error2 == pytest.approx(stated, rel=0.15)
 
 
-def test_what_stands_alone_or_never_varies_is_left():
+def test_a_variance_that_stands_alone_or_is_zero_stays():
     keys = [*KEYS, StatisticKey("step", "step", "undershoot"), StatisticKey("spectrum", "dark", "band 0")]
     made = np.append(drawn(np.ones(len(KEYS)), 6), [7.0, 0.0])
     found, freedom = moderated(keys, made, FREEDOM)

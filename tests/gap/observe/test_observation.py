@@ -181,7 +181,7 @@ def test_coincidences_are_of_both_orders_of_neighbours(stream):
         assert tuple(o.coincidences[lag]) == (across, down), lag
 
 
-def test_film_counts_in_bins_and_is_kept_only_when_asked(stream):
+def test_film_counts_in_bins_and_is_kept_on_request_only(stream):
     bins = len(stream) // BIN
     o = seen(stream, film=True)
     expected = stream[: bins * BIN].reshape(bins, BIN, -1).sum(axis=1)

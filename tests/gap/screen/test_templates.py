@@ -42,7 +42,7 @@ def test_shipped_templates_are_of_the_present_laws():
     assert not other, f"python -m tools.build_templates --rebuild {' '.join(other)}  (or --same-law, where it is)"
 
 
-def test_what_is_saved_is_read_again(tmp_path):
+def test_saved_templates_are_read_again(tmp_path):
     """The shipped file, written anew, holds the same arrays: half precision loses nothing twice."""
     templates = shipped_templates()
     save_templates(templates, tmp_path / FILE)
@@ -74,7 +74,7 @@ def test_where_motion_stands_out_all_that_shows_by_it_is_tried_in_every_shape():
     assert [s.start for s in starts_to_fit(screened, 1000.0, Searching()) if s.name == "blooming"] == [{"full": 0.85}]
 
 
-def test_what_stands_out_most_is_loud_however_quiet_it_is():
+def test_the_loudest_group_stands_out_however_quiet_it_is():
     """An alarm raised by motion alone, at 5.5 noises, was never put to blooming."""
     keys = (
         StatisticKey("rates", "flat", "slope"),

@@ -59,7 +59,7 @@ def test_few_intervals_tell_nothing():
     assert lateness(at(np.array([10.0, 3000.0]))) == {}
 
 
-def test_what_all_pixels_do_is_no_variance_within_a_pixel():
+def test_a_change_of_all_pixels_is_no_variance_within_a_pixel():
     drifting = seen(recorded(effect("lamp_drift", sigma_per_root_s=0.3)))
     for flat in ("flat-0.2", "flat-0.65"):
         trend, pixels = (drifting[StatisticKey("drift", flat, name)] for name in ("trend", "pixels"))

@@ -39,7 +39,7 @@ def dimmed(shown, factor):
     return Keyframes(shown.light.frame, (shown.light.radiance / factor).astype("f4"))
 
 
-def test_what_bends_a_quarter_of_the_array_shows_in_its_corner():
+def test_a_bend_of_a_quarter_of_the_array_shows_in_its_corner():
     """Corners are stated against the array's mean: one is bent by e, they are off by 3/4 e and three times -1/4 e."""
     plain, bent = spikes_of(), spikes_of(effect("dead_time", tau_us=0.5))
     rows, columns = SHAPE[0] // 2, SHAPE[1] // 2

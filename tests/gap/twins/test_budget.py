@@ -45,7 +45,7 @@ def test_nothing_is_left_out_while_there_is_less_than_the_most():
     assert budget.left_out == [] and unfinished(budget) == []
 
 
-def test_what_is_left_out_is_said_once():
+def test_a_skipped_step_is_noted_once():
     budget = Budget(20, [13, 7])
     assert not budget.allows("a third effect") and not budget.allows("a third effect")
     assert not budget.allows("photodiode_lag of another shape")
@@ -55,20 +55,20 @@ def test_what_is_left_out_is_said_once():
     ]
 
 
-def test_skipped_refinements_are_said_to_widen_intervals():
+def test_skipped_refinements_are_noted_to_widen_intervals():
     (said,) = unfinished(Budget(20, [20], ["finer strengths"]))
     (other,) = unfinished(Budget(20, [20], ["a third effect"]))
     assert said.endswith("Intervals are wider for it.") and "wider" not in other
 
 
-def test_what_takes_more_than_is_left_is_not_begun():
+def test_a_step_over_the_rest_of_the_budget_does_not_begin():
     budget = Budget(20, [13])
     assert budget.allows("photodiode_lag of another shape", 6) and budget.left_out == []
     assert not budget.allows("photodiode_lag of another shape", 7)
     assert budget.left_out == ["photodiode_lag of another shape"]
 
 
-def test_what_a_verdict_can_hardly_do_without_may_take_more():
+def test_a_step_that_a_verdict_needs_may_take_more():
     budget = Budget(20, [13])
     assert budget.allows("a second effect", 12, needed=True) and not budget.allows("a second effect", 13, needed=True)
 
@@ -100,7 +100,7 @@ def test_of_several_effects_strengths_alone_are_refined_when_enough_was_simulate
     assert {name for name, _ in free} == set(names)
 
 
-def test_what_was_not_refined_is_known_no_better_than_before():
+def test_parameters_that_were_not_refined_are_known_no_better_than_before():
     assert polish.no_smaller({"fraction": 0.1}, {"fraction": 0.3, "tau_us": 5.0}) == {"fraction": 0.3, "tau_us": 5.0}
     assert polish.no_smaller({"fraction": 0.4}, {"fraction": 0.3, "tau_us": 5.0}) == {"fraction": 0.4, "tau_us": 5.0}
     assert polish.no_smaller({"fraction": 0.1, "tau_us": 2.0}, {"fraction": 0.3}) == {"fraction": 0.1, "tau_us": 2.0}
@@ -157,7 +157,7 @@ class Found:
 
 
 @pytest.mark.parametrize("spent, settled", [(38, False), (30, True)])
-def test_what_was_found_takes_one_step_when_no_effort_is_left(spent: int, settled: bool, monkeypatch):
+def test_a_fit_takes_one_step_when_no_effort_is_left(spent: int, settled: bool, monkeypatch):
     """Two predictions of five recordings, each made twice, and four twins more: forty, of sixty and three tenths."""
     monkeypatch.setattr(searching, "with_errors", lambda turn, errors: (turn, errors))
     monkeypatch.setattr(searching, "stepped_once", lambda problem, found, names: (found, {names[0]: {"share": 0.1}}))
@@ -171,7 +171,7 @@ def test_what_was_found_takes_one_step_when_no_effort_is_left(spent: int, settle
     assert case.budget.left_out == ["finer strengths"]
 
 
-def test_what_is_not_simulated_together_is_judged_by_the_model_given(monkeypatch):
+def test_pairs_without_a_simulation_are_judged_by_the_model_given(monkeypatch):
     """And not by the one with the first effect, whose noise is no price to the second."""
     monkeypatch.setattr(searching, "simulated_for", lambda *_: ([0], 1))
     monkeypatch.setattr(searching, "stepped_once", lambda problem, found, names: (found, {}))

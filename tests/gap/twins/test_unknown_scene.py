@@ -102,7 +102,7 @@ def test_rates_are_drawn_within_what_the_recording_leaves_open():
     assert np.isfinite(plausible_true_rates(silent, 4e-5, np.random.default_rng(0))).all()
 
 
-def test_patterns_cannot_be_tested_in_a_scene_and_it_is_said_what_would():
+def test_patterns_cannot_be_tested_in_a_scene_and_their_needs_are_stated():
     names, lacking = can_test(
         ["vignetting", "conversion_gain_spread", "dead_time", "threshold_flicker_noise"], [CONDITION]
     )

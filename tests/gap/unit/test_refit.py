@@ -105,7 +105,7 @@ def test_a_constrained_refit_leaves_no_negative_charge():
     assert constrained_refit(MODEL, base).dark.min() == 0.0
 
 
-def test_what_all_pixels_have_is_the_mean_of_those_that_do_not_differ():
+def test_the_level_of_all_pixels_is_the_mean_of_those_that_do_not_differ():
     """Rates between whole frames lie on a lattice, of which their median is a step.  Hot pixels are left out."""
     rng = np.random.default_rng(0)
     level, step = 0.37, 1.0
