@@ -68,8 +68,8 @@ class RotatingDisk(PlanarScene):
     drift_px_s      (x, y) velocity of the disk's centre [pixels/s]
     angle           at frame 0 [radians]
     motion_per_key  most the rim may move between two keys [pixels], as far as whole frames allow; the sensor blends
-                    two keys.  `spikecam bench scenes` prints what that costs: the light of a frame is 1.2 % rms off
-                    at 0.58 pixels a key (2000 rpm), 3.1 % at twice that
+                    two keys.  `python -m benchmarks.scenes` prints the error: the light of a frame is 1.2 % rms off at
+                    0.58 pixels a key (2000 rpm), 3.1 % at twice that
 
     Truth: object 1 is the disk; poses["disk"] is (x, y, angle) with the angle in [0, 2 pi).
     Errors: InputError for a value out of range, by name.

@@ -17,18 +17,18 @@ import tyro
 from scipy import optimize, special
 
 from spikecam_env.calibration.flat_maps import LUX, counted, spread_counts
-from spikecam_env.calibration.real import (
+from spikecam_env.sensor import Circuit, SensorModel
+from spikecam_env.types import Floats
+from spikecam_env.whole import whole_file
+from tools.real.recordings import (
     MAPS_FRAME_RATE_HZ,
     QUANTILES,
     read_response_and_dark,
     read_wall,
     wall_statistics,
 )
-from spikecam_env.calibration.two_levels import split_shading
-from spikecam_env.calibration.wall_noise import OCTAVES, WallNoise, fit_wall_noise
-from spikecam_env.sensor import Circuit, SensorModel
-from spikecam_env.types import Floats
-from spikecam_env.whole import whole_file
+from tools.real.two_levels import split_shading
+from tools.real.wall_noise import OCTAVES, WallNoise, fit_wall_noise
 
 PRESET = Path(str(resources.files("spikecam_env.sensor"))) / "presets" / "measured.toml"
 

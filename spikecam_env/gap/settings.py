@@ -132,7 +132,7 @@ class Judging:
         0.02,
         "p, adjusted",
         "Below it, recordings and model disagree.",
-        "one false alarm in fifty campaigns; 2.0 % of 200 by `python -m benchmarks.moderated_variances`",
+        "one false alarm in fifty campaigns; 2.0 % of 200 were measured (benchmarks/moderated_variances.py, 0.1.0)",
         most=1.0,
     )
     gate: float = setting(
@@ -223,7 +223,7 @@ class Baseline:
         1e-3,
         "p, of a recording",
         "Below it, a window of a static recording moves (Bonferroni).",
-        "`python -m benchmarks.motion_limits`",
+        "0 of 140 static recordings are called moving (docs/gap.md)",
         most=1.0,
     )
     least_contrast: float = setting(
@@ -303,13 +303,13 @@ class Twins:
         60.0,
         "noises",
         "A weak linear effect is simulated as strong as this, within `most_extrapolated`, and scaled down.",
-        "in proportion so far: `python -m benchmarks.in_proportion`",
+        "in proportion so far (benchmarks/in_proportion.py of version 0.1.0)",
     )
     most_extrapolated: float = setting(
         4.0,
         "times",
         "A strength, and the unit under it, are extrapolated at once.",
-        "in proportion so far: `python -m benchmarks.in_proportion`",
+        "in proportion so far (benchmarks/in_proportion.py of version 0.1.0)",
         least=1.0,
     )
     converged: float = setting(

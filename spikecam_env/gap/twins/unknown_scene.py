@@ -3,7 +3,7 @@
     L(x, y) = (rate(x, y) - dark(x, y)) / gain(x, y)        under the unit and the model to be tested
 
 Rates then say nothing; what is left to test is when spikes come: noise, neighbours, rows, drift, lines.  Every twin
-draws rates anew from what the recording leaves open (`calibration.real.plausible_rates`), and where a model bends the
+draws rates anew that agree with the recording (`calibration.spike_times.plausible_rates`), and where a model bends the
 response, light is corrected until the rates come out.
 """
 
@@ -14,7 +14,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from spikecam_env.calibration.real import plausible_rates
+from spikecam_env.calibration.spike_times import plausible_rates
 from spikecam_env.gap.observe.conditions import Condition
 from spikecam_env.gap.observe.observation import ObservedRecording
 from spikecam_env.gap.twins.simulate import simulate

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from spikecam_env.calibration.flat_maps import read_flat_maps
 from spikecam_env.calibration.response import rates_from_times
-from spikecam_env.calibration.spike_times import SpikeTimes, spike_times
+from spikecam_env.calibration.spike_times import SpikeTimes, ideal_second_difference, spike_times
 from spikecam_env.compiled import njit
 from spikecam_env.errors import InputError
 from spikecam_env.streams import pack_frames
@@ -93,28 +93,6 @@ def wall_statistics(spikes: NDArray[np.uint8]) -> WallStatistics:
         float(floor.mean()),
         float(floor.std() / np.sqrt(floor.size)),
     )
-
-
-def plausible_rates(times: SpikeTimes, white: float, rng: np.random.Generator) -> Floats:
-    """(P,) rates drawn from what each pixel's first and last spike leave open, under jitter s^2 = white.
-
-    Measured rates crowd at simple fractions: a pixel of interval 5.004 shows one of 5 for a hundred spikes.  A camera
-    simulated at exactly such rates has second differences that no real one has; drawn rates lie as the true ones do.
-    """
-    n = np.maximum(times.count - 1, 1)
-    interval = np.maximum(times.last - times.first, 1) / n
-    after = times.frames - 1 - times.last
-    begin = times.first + rng.random(n.size) * np.clip(interval - times.first, 0.0, 1.0)
-    end = times.frames - after - rng.random(n.size) * np.clip(interval - after, 0.0, 1.0)
-    walk = np.sqrt(n * white) * interval * rng.standard_normal(n.size)
-    least = n  # a pixel fires once a frame at most, however wide the jitter
-    return np.asarray(n / np.maximum(end - begin + walk, least))
-
-
-def ideal_second_difference(k: NDArray[np.int64], interval: Floats) -> Floats:
-    """A_k of a noise-free pixel of interval T, phase uniform: 2 min(x, 1 - x), x the fractional part of kT."""
-    x = np.mod(k * interval, 1.0)
-    return 2.0 * np.minimum(x, 1.0 - x)
 
 
 def _variance_above_floor(spikes: NDArray[np.uint8]) -> Floats:

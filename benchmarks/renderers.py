@@ -1,6 +1,6 @@
 """How fast and how exact each back-end is on this machine, on one picture of six textured objects, 17 000 triangles.
 
-spikecam bench renderers
+python -m benchmarks.renderers
 """
 
 from __future__ import annotations
@@ -9,10 +9,12 @@ import time
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass
 from multiprocessing import get_context
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import trimesh
+import tyro
 from numpy.typing import NDArray
 from trimesh.transformations import rotation_matrix
 
@@ -21,6 +23,7 @@ from scenes.renderers.embree import Embree
 from scenes.renderers.protocol import Lighting, PictureWindow, Pinhole, Renderer, Sprite, Surface
 from scenes.textures import TEXTURES
 from spikecam_env.bench.machine import SHAPE
+from spikecam_env.cli.bench import print_figures
 
 EXACT_RAYS = 16
 """A pixel and axis, of the picture that back-ends, and light in space, are compared with."""
@@ -134,3 +137,17 @@ def _rms(key: list[NDArray[np.float32]], other: list[NDArray[np.float32]], cover
     """Over the pixels of all objects where there is light."""
     squares = [np.square(a - b, dtype=np.float64)[c > 0] for a, b, c in zip(key, other, covered, strict=True)]
     return float(np.sqrt(np.mean(np.concatenate(squares))))
+
+
+def main(out: Path | None = None, json: bool = False) -> None:
+    """Print the speed and the error of each back-end of this machine.
+
+    Args:
+        out: file for the figures, as JSON.
+        json: print the figures as JSON, and no table.
+    """
+    print_figures(bench_renderers, out, json)
+
+
+if __name__ == "__main__":
+    tyro.cli(main)

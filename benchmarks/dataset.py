@@ -1,6 +1,6 @@
 """How fast a dataset is made, and where the time goes.
 
-spikecam bench dataset
+python -m benchmarks.dataset
 """
 
 from __future__ import annotations
@@ -9,8 +9,12 @@ import os
 import tempfile
 import time
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
+import tyro
+
+from spikecam_env.cli.bench import print_figures
 from spikecam_env.datasets.build import Built, build
 from spikecam_env.datasets.plan import Plan, phm_n
 from spikecam_env.datasets.verify import verify
@@ -57,3 +61,17 @@ def _row(name: str, plan: Plan, wall_s: float, built: Built | None) -> dict[str,
         "processor ms/frame": 1e3 * built.processor_s / frames if built else None,
         **{part: f"{seconds[part] / total:.0%}" if part in seconds else None for part in PARTS},
     }
+
+
+def main(out: Path | None = None, json: bool = False) -> None:
+    """Print frames a second of a dataset into files, and the share of each part.
+
+    Args:
+        out: file for the figures, as JSON.
+        json: print the figures as JSON, and no table.
+    """
+    print_figures(bench_dataset, out, json)
+
+
+if __name__ == "__main__":
+    tyro.cli(main)

@@ -1,17 +1,20 @@
 """What each effect costs on the fast engine, as a ratio to the base model measured in the same run.
 
-spikecam bench effects
+python -m benchmarks.effects
 """
 
 from __future__ import annotations
 
 import time
 from collections.abc import Iterable
+from pathlib import Path
 from typing import Any
 
 import numpy as np
+import tyro
 from tqdm import tqdm
 
+from spikecam_env.cli.bench import print_figures
 from spikecam_env.sensor.effects import CATALOGUE
 from spikecam_env.sensor.model import SensorModel
 from spikecam_env.sensor.sensor import SpikeSensor
@@ -54,3 +57,17 @@ def _seconds_a_step(model: SensorModel, shape: tuple[int, int], level: float, se
         best = min(best, end - begin)
         if end >= until:
             return best / (FRAMES * light.size)
+
+
+def main(out: Path | None = None, json: bool = False) -> None:
+    """Print the cost of each effect over the base model.
+
+    Args:
+        out: file for the figures, as JSON.
+        json: print the figures as JSON, and no table.
+    """
+    print_figures(bench_effects, out, json)
+
+
+if __name__ == "__main__":
+    tyro.cli(main)

@@ -1,18 +1,22 @@
 """How fast scenes are, how far their light is from the truth, and whether their flow is right.
 
-spikecam bench scenes
+python -m benchmarks.scenes
 """
 
 from __future__ import annotations
 
 import time
 from collections.abc import Iterable
+from pathlib import Path
 from typing import Any
 
 import numpy as np
+import tyro
 from numpy.typing import NDArray
 from tqdm import tqdm
 
+from benchmarks.exact_disk import supersampled
+from benchmarks.renderers import EXACT_RAYS, bench_renderers
 from scenes.catalogue import SCENES, make_scene
 from scenes.collage import Collage
 from scenes.disk import RotatingDisk, disk_texture
@@ -21,9 +25,8 @@ from scenes.keys import side_by_side
 from scenes.protocol import Scene
 from scenes.sliding import SlidingTexture
 from scenes.world import World
-from spikecam_env.bench.exact_disk import supersampled
 from spikecam_env.bench.machine import FRAME_RATE_HZ, SHAPE
-from spikecam_env.bench.renderers import EXACT_RAYS, bench_renderers
+from spikecam_env.cli.bench import print_figures
 from spikecam_env.errors import InputError
 from spikecam_env.sensor import SpikeSensor
 
@@ -213,3 +216,17 @@ def _disk_errors(disk: RotatingDisk, texture: NDArray[np.float32], dark: float) 
 def _rms(errors: list[NDArray[np.float64]]) -> float:
     """[%]"""
     return 100 * float(np.sqrt(np.mean(np.square(np.concatenate(errors)))))
+
+
+def main(out: Path | None = None, json: bool = False) -> None:
+    """Print the speed of scenes, the error of their light, and the error of their flow.
+
+    Args:
+        out: file for the figures, as JSON.
+        json: print the figures as JSON, and no table.
+    """
+    print_figures(bench_scenes, out, json)
+
+
+if __name__ == "__main__":
+    tyro.cli(main)

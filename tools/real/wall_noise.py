@@ -18,14 +18,9 @@ import numpy as np
 from numpy.typing import NDArray
 from tqdm import tqdm
 
-from spikecam_env.calibration.real import (
-    STEPS,
-    WallStatistics,
-    ideal_second_difference,
-    plausible_rates,
-    wall_statistics,
-)
+from spikecam_env.calibration.spike_times import ideal_second_difference, plausible_rates
 from spikecam_env.types import Floats
+from tools.real.recordings import STEPS, WallStatistics, wall_statistics
 
 OCTAVES = 12
 
