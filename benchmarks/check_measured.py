@@ -1,4 +1,4 @@
-"""How true presets are to the real recordings: static wall pixels, and the flat maps' distributions.
+"""Presets beside the real recordings: static wall pixels, and the flat maps' distributions.
 
 python -m benchmarks.check_measured REAL
 """
@@ -59,24 +59,30 @@ class ClockLocking(NamedTuple):
 
 @dataclass(frozen=True)
 class SimulatedWall:
-    """Statistics of one model's camera at the wall's rates, means over takes.  excess_sd: standard error of the mean.
-
-    chi2: of the wall's 40 values of excess about this model's, with the covariance of both.
-    """
+    """Statistics of one model's camera at the wall's rates, means over takes."""
 
     model: str
     excess: Floats
     excess_sd: Floats
+    """Standard errors of `excess`."""
     chi2: float
+    """chi2 of the wall's 40 values of excess about this model's, with the covariance of both."""
     minimum_range: Floats
+    """Percentiles of the pixels."""
     variance_excess: float
     locking: ClockLocking
 
 
 def simulated_wall(model: SensorModel | str, wall: WallStatistics, shape: tuple[int, int], takes: int) -> SimulatedWall:
-    """A unit of the model in light that gives its pixels rates the wall's may have had (`plausible_rates`).
+    """Simulate the wall with a unit of a model, at rates that agree with the wall's (`plausible_rates`).
 
-    shape: rows, columns of the wall.  Pixels whose dark level alone exceeds the wall's rate get no light.
+    Pixels whose dark level alone exceeds the wall's rate get no light.
+
+    Args:
+        model: the model.
+        wall: statistics of the real wall.
+        shape: rows and columns of the wall.
+        takes: number of takes.
     """
     runs, locking = [], []
     for take in range(takes):
@@ -130,8 +136,14 @@ def record_wall(
 def flat_quantiles(model: SensorModel | str, light: Floats, dark: Floats, seed: int = 0) -> list[dict[str, object]]:
     """Rows of measured and modelled quantiles of dark level and response, and their ratio less one.
 
-    light, dark: (H, W) rates of the real maps.  The model's light is scaled to the same median response.  Dark levels
-    of both are counts, spread evenly within a count: a tenth of the pixels have ten spikes or fewer in the dark.
+    The model's light is scaled to the same median response.  Dark levels of both are counts, spread evenly within a
+    count: a tenth of the pixels have ten spikes or fewer in the dark.
+
+    Args:
+        model: the model.
+        light: (H, W) rates of the real maps in light, less the dark's.
+        dark: (H, W) rates in the dark.
+        seed: seed of the unit.
     """
     camera, response, modelled = modelled_maps(model, light, seed)
     rows: list[dict[str, object]] = []

@@ -1,4 +1,4 @@
-"""How fast a dataset is made, and where the time goes.
+"""Speed of making a dataset, and the share of each part.
 
 python -m benchmarks.dataset
 """
@@ -26,13 +26,17 @@ PARTS = ("scene", "noisy", "clean", "file", "truth", "digest", "start")
 
 
 def bench_dataset(plan: Plan | None = None, jobs: int | None = None) -> list[dict[str, Any]]:
-    """Make a dataset and verify it; default: the PHM-like scenes, 1000 frames each at 250 x 400, one process a core.
+    """Make a dataset and verify it.
 
-    Columns: run, scenes, frames/s (wall clock, start of the processes included), processor time a frame [ms] (which
-    other work on the machine changes little; starting the processes not included), and the share of the workers' time
-    on each part: scene (light), noisy and clean (camera and twin), file (packing and writing), truth, digest (SHA-256),
-    start (making the scene, exposure, compiling or loading what is compiled).
-    Rows: one process (first scenes only), all processes, verify.
+    Args:
+        plan: default: the PHM-like scenes, 1000 frames each at 250 x 400.
+        jobs: processes; default: one a core.
+
+    Returns:
+        Rows of one process (first scenes only), all processes, and verify.  frames/s is by the wall clock, the start of
+        the processes included.  Processor time a frame [ms] is without it, and other work on the machine changes it
+        little.  Then the share of the workers' time on each part: scene (light), noisy and clean (camera and twin),
+        file (packing and writing), truth, digest (SHA-256), start (scene, exposure, compiled code).
     """
     plan = phm_n() if plan is None else plan
     jobs = (os.cpu_count() or 1) if jobs is None else jobs

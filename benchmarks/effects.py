@@ -1,4 +1,4 @@
-"""What each effect costs on the fast engine, as a ratio to the base model measured in the same run.
+"""Cost of each effect on the fast engine, as a ratio to the base model measured in the same run.
 
 python -m benchmarks.effects
 """
@@ -28,9 +28,14 @@ def bench_effects(
 ) -> list[dict[str, Any]]:
     """Measure steady light of one level on one array size after another, with NUMBA_NUM_THREADS threads.
 
-    names: effects to measure; default all that act from frame to frame.  level: spikes a frame.  seconds: for each
-    effect and shape; the best repeat of 64 frames counts, and compiling does not.
-    Columns: effect, and for each shape ns/px-step and the ratio to the base model, scsim without the effect.
+    Args:
+        names: effects to measure; default all that act from frame to frame.
+        level: spikes a frame.
+        seconds: time for each effect and shape; the best repeat of 64 frames counts, and compiling does not.
+        shapes: sizes of the array.
+
+    Returns:
+        Rows of effect, and for each shape ns/px-step and the ratio to the base model, scsim without the effect.
     """
     chosen = list(names) or [name for name, effect in CATALOGUE.items() if not effect.is_fixed()]
     base = SensorModel.preset("scsim")

@@ -33,20 +33,18 @@ Objects = list[tuple[Surface, NDArray[np.float64]]]
 
 @dataclass(frozen=True)
 class RendererComparison:
-    """One back-end on this machine.
-
-    backend    as `choose_renderer` takes it
-    name       as the back-end calls itself; what is wrong where it does not work
-    key_ms     all objects of the picture once, best of the repeats [ms]; nan where it does not work
-    error      rms of radiance against `EXACT_RAYS`^2 rays a pixel where there is an object, share of full scale
-    to_embree  rms of radiance against embree at the same supersampling, likewise
-    """
+    """One back-end on this machine."""
 
     backend: str
+    """Name, as `choose_renderer` takes it."""
     name: str
+    """The back-end's own name, or the reason why it does not work."""
     key_ms: float
+    """Time of all objects of the picture once, best of the repeats [ms]; NaN where it does not work."""
     error: float
+    """rms of radiance against `EXACT_RAYS`^2 rays a pixel where there is an object, share of full scale."""
     to_embree: float
+    """rms of radiance against embree at the same supersampling, likewise."""
 
 
 def compare_backends(

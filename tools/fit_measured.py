@@ -38,30 +38,30 @@ _HOT_RATES = (0.03, 0.05, 0.1)
 
 @dataclass(frozen=True)
 class Bowl:
-    """Shading 1 - falloff r^2 / r_corner^2 about a centre (shares of the array), as `vignetting` has it.
-
-    left: relative spread of the smooth part beside it.
-    """
+    """Shading 1 - falloff r^2 / r_corner^2 about a centre (shares of the array), as `vignetting` has it."""
 
     falloff: float
     centre_x: float
     centre_y: float
     left: float
+    """Relative spread of the smooth part beside it."""
 
 
 @dataclass(frozen=True)
 class MeasuredConstants:
-    """The preset's constants.  shading: relative spread of the smooth part; bowl: what describes it.
-
-    response_at_flat: median rate at 335 lux [spikes/frame].  dark_median [spikes/frame], dark_sigma: of the logarithm.
-    """
+    """The preset's constants."""
 
     shading: float
+    """Relative spread of the smooth part."""
     bowl: Bowl
+    """The fit of the shading."""
     pixel_spread: float
     response_at_flat: float
+    """Median rate at 335 lux [spikes/frame]."""
     dark_median: float
+    """Median dark level [spikes/frame]."""
     dark_sigma: float
+    """Standard deviation of the dark level's logarithm."""
     hot_fraction: float
     hot_mean: float
     noise: WallNoise

@@ -1,4 +1,4 @@
-"""What calibration needs of a recording, in one pass over its bits: spike times, not counts.
+"""Spike times of a recording, in one pass over its bits, as calibration needs them in place of counts.
 
 A steady pixel's count is known to a spike, its first and last spike to a frame: with n spikes the rate is
 (n - 1) / (last - first), T times better than n / frames.
@@ -24,18 +24,22 @@ STEPS = (1, 2, 4, 8, 16, 32, 64, 128)
 
 @dataclass(frozen=True)
 class SpikeTimes:
-    """Per pixel, row-major: count, first, last (P,) int64 (-1 without spikes); frames: length of the recording.
-
-    square: (P, K) float64 sums of (t_(n+2k) - 2 t_(n+k) + t_n)^2 and terms: (P, K) how many, at k = steps.
-    """
+    """Spike times of P pixels, row-major."""
 
     frames: int
+    """Length of the recording."""
     count: NDArray[np.int64]
+    """(P,) number of spikes."""
     first: NDArray[np.int64]
+    """(P,) frame of the first spike, -1 without spikes."""
     last: NDArray[np.int64]
+    """(P,) frame of the last spike, -1 without spikes."""
     steps: NDArray[np.int64]
+    """(K,) the k of A_k."""
     square: NDArray[np.float64]
+    """(P, K) sums of (t_(n+2k) - 2 t_(n+k) + t_n)^2."""
     terms: NDArray[np.int64]
+    """(P, K) number of terms of the sums."""
 
     @property
     def rate(self) -> NDArray[np.float64]:
@@ -47,9 +51,13 @@ class SpikeTimes:
 def spike_times(
     packed: NDArray[np.uint8], pixels: int, steps: ArrayLike = STEPS, *, threads: int | None = None
 ) -> SpikeTimes:
-    """Summarise (frames, ceil(pixels/8)) uint8 bits, as `streams.pack_frames` gives them.
+    """Spike times of a packed recording.
 
-    threads: default NUMBA_NUM_THREADS.
+    Args:
+        packed: (frames, ceil(pixels/8)) uint8 bits, as `streams.pack_frames` gives them.
+        pixels: number of pixels.
+        steps: (K,) the k of A_k.
+        threads: number of threads, default NUMBA_NUM_THREADS.
     """
     ks = np.asarray(steps, dtype=np.int64)
     words = as_words(np.asarray(packed))

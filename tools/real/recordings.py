@@ -1,4 +1,4 @@
-"""The real recordings that the preset `measured` is fitted to, and what is measured on them.
+"""The real recordings that the preset `measured` is fitted to, and their statistics.
 
 wall.npz: 500 frames of a wall in good light.  Only a rectangle of bare wall is used: nothing moves there; leaves and
 edges, which tremble by more than the noise, are outside.  flat_335lux_maps.npz: spikes of each pixel in light and in
@@ -27,7 +27,7 @@ WALL = (slice(110, 200), slice(15, 355))
 """Rows and columns of bare wall."""
 
 STEPS = tuple(range(1, 41))
-"""k of A_k that acceptance asks for."""
+"""k of A_k that are compared."""
 
 MAPS = "flat_335lux_maps.npz"
 MAPS_FRAME_RATE_HZ = 20_000.0
@@ -57,24 +57,26 @@ def read_response_and_dark(folder: str | Path) -> tuple[Floats, Floats]:
 
 @dataclass(frozen=True)
 class WallStatistics:
-    """What static pixels show.  times: spikes of each pixel at STEPS; rate: (P,) [spikes/frame].
-
-    excess, excess_sd: (40,) A_k less that of an ideal camera at the same rates, and its standard error over pixels.
-    minimum_range: (P,) smallest range over slopes a of N(t) - a t; below 1 for an ideal camera.
-    variance_excess: mean over pixels of interval variance less f(1-f); variance_excess_sd: its standard error.
-    """
+    """Statistics of static pixels."""
 
     times: SpikeTimes
+    """Spike times of each pixel, at STEPS."""
     rate: Floats
+    """(P,) rates [spikes/frame]."""
     excess: Floats
+    """(40,) A_k less that of an ideal camera at the same rates."""
     excess_sd: Floats
+    """(40,) standard errors of `excess`, over pixels."""
     minimum_range: Floats
+    """(P,) smallest range over slopes a of N(t) - a t; below 1 for an ideal camera."""
     variance_excess: float
+    """Mean over pixels of interval variance less f(1-f)."""
     variance_excess_sd: float
+    """Standard error of `variance_excess`."""
 
 
 def wall_statistics(spikes: NDArray[np.uint8]) -> WallStatistics:
-    """All of them, from (T, rows, columns) spikes of steady light."""
+    """Statistics of (T, rows, columns) spikes of steady light."""
     pixels = spikes.shape[1] * spikes.shape[2]
     packed = pack_frames(spikes)
     times = spike_times(packed, pixels, STEPS)

@@ -1,4 +1,4 @@
-"""The verdict on recordings that are said to be static and are not, and what a user does about it."""
+"""The verdict on recordings of wrong labels, said to be static and in motion, and the way on."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ def moves(
 
 
 def what_to_do(motion: tuple[DetectedMotion, ...], static_only: bool, least: float) -> list[str]:
-    """Steps that make the campaign usable.  least: share of pixels that has to be static."""
+    """Steps that make the campaign usable; least: share of pixels that has to be static."""
     share = float(static_pixels(motion).mean())
     advice = [TO_DO] if any(not m.light_known for m in motion) else []
     if any(m.light_known for m in motion):
