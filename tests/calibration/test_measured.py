@@ -117,7 +117,7 @@ def test_two_levels_tell_gain_from_offset() -> None:
 
 @needs_real
 def test_the_flat_maps_are_counts_of_4000_frames() -> None:
-    """What `flat_maps` says: whole counts at 335 lux, at 153 lux and in the dark, in every pixel."""
+    """As `flat_maps` states: whole counts at 335 lux, at 153 lux and in the dark, in every pixel."""
     maps = read_flat_maps(REAL / MAPS)
     off = np.abs(FRAMES * maps.lit - np.round(FRAMES * maps.lit))
     print(f"335 lux: {off.max():.1e} from whole counts; pairs of dark and 153 lux found: {maps.counted.mean():.2%}")
@@ -127,11 +127,11 @@ def test_the_flat_maps_are_counts_of_4000_frames() -> None:
 
 @needs_real
 def test_pixels_differ_by_gain_and_an_offset_and_not_by_a_factor_common_with_the_dark() -> None:
-    found = two_levels(read_flat_maps(REAL / MAPS))
-    print(found)
-    assert abs(found.covariance_off) < 0.02
-    assert found.common > 2 * found.lit
-    assert found.gain_dark < 0.5 * found.lit_dark
+    spreads = two_levels(read_flat_maps(REAL / MAPS))
+    print(spreads)
+    assert abs(spreads.covariance_off) < 0.02
+    assert spreads.common > 2 * spreads.lit
+    assert spreads.gain_dark < 0.5 * spreads.lit_dark
 
 
 def test_a_camera_without_a_clock_has_as_many_late_spikes_as_early_ones() -> None:

@@ -121,6 +121,7 @@ def _fit_twins(problem: Problem, name: str, parameters: dict[str, float], expect
         with_effect(problem.model, name, parameters), constrained_refit(problem.model, problem.case.base)
     )
     first = replace(bare, white=white**times * bare.white)
+    least = problem.misfit() - problem.settings.deviance.compare
     trial = _Trial(parameters, first, problem.affected([name], expected * times))
     way: _Rescaling | None = None
     repeated = False
@@ -139,7 +140,7 @@ def _fit_twins(problem: Problem, name: str, parameters: dict[str, float], expect
         if not repeated and not is_last and not has_converged(assumed, trial.base, how.converged):
             repeated = True
             continue
-        way = _rescaling(problem, name, trial.parameters[strength], predicted, size, way)
+        way = _rescaling(problem, name, trial, predicted, least, way)
         if way.is_useless or is_last or (way.is_near and turn):
             break
         if not way.is_weak:
@@ -154,30 +155,28 @@ def _fit_twins(problem: Problem, name: str, parameters: dict[str, float], expect
 
 
 def _rescaling(
-    problem: Problem, name: str, strength: float, predicted: Prediction, size: float, before: _Rescaling | None
+    problem: Problem, name: str, trial: _Trial, predicted: Prediction, least: float, before: _Rescaling | None
 ) -> _Rescaling:
-    """The way from a strength to a better one, by its twins and those of the trial `before`.
+    """The way from a trial to a better strength.
 
     Args:
         problem: the problem.
         name: the effect.
-        strength: of the twins.
-        predicted: their prediction.
-        size: noises by which the effect shows.
-        before: the way that led to the strength.
+        trial: the trial.
+        predicted: its prediction.
+        least: misfit above which the effect is useless.
+        before: the way to the trial, which gives the slope with it.
     """
     effect, null, how = candidate(name), problem.null, problem.settings.twins
-    fitting = problem.settings.fitting
+    fitting, strength = problem.settings.fitting, trial.parameters[effect.strength]
     scale, sd = scale_to(null, problem.seen, predicted)
     slope = None if before is None else before.slope
-    if (
-        problem.misfit(with_change_scaled(null, predicted, scale))
-        > problem.misfit() - problem.settings.deviance.compare
-    ):
+    if problem.misfit(with_change_scaled(null, predicted, scale)) > least:
         return _Rescaling(strength, predicted, scale, sd, LEAST_FACTOR, slope, is_useless=True)
     last = None if before is None else (before.strength, before.predicted)
     slope = slope_between(problem, last, (strength, predicted)) if effect.power == 2.0 else None
     factor = factor_to(problem, name, predicted, scale, slope)
+    size = effect_size(null, problem.seen, predicted.mean - null.mean)
     is_weak = abs(scale) * size < fitting.visible or (
         effect.is_linear and 1 / how.most_extrapolated < scale < 1 and scale * size < how.target_size
     )
