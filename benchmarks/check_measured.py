@@ -79,7 +79,6 @@ def simulated_wall(model: SensorModel | str, wall: WallStatistics, shape: tuple[
     Pixels whose dark level alone exceeds the wall's rate get no light.
 
     Args:
-        model: the model.
         wall: statistics of the real wall.
         shape: rows and columns of the wall.
         takes: number of takes.
@@ -140,7 +139,6 @@ def flat_quantiles(model: SensorModel | str, light: Floats, dark: Floats, seed: 
     count: a tenth of the pixels have ten spikes or fewer in the dark.
 
     Args:
-        model: the model.
         light: (H, W) rates of the real maps in light, less the dark's.
         dark: (H, W) rates in the dark.
         seed: seed of the unit.

@@ -338,7 +338,6 @@ def expose(
         film: the light.
         edges: (F+1, H) times at which each row is read.
         offset: (F * k, H or 1, W or 1) added to the thresholds in each k-th part of a frame [electrons].
-        rng: source of the draws.
         spikes: (F, H, W) uint8, zeros.
     """
     frames, rows, columns = spikes.shape

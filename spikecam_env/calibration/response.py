@@ -146,7 +146,6 @@ def fit_lines(light: Floats, rates: Rates, white: float, use: NDArray[np.bool_] 
 
     Args:
         light: (R, P) radiance.
-        rates: the rates.
         white: s^2.
         use: (R,) whether a recording is fitted; the others only get residuals.
     """

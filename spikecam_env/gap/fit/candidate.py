@@ -60,7 +60,6 @@ def fit(
 
     Args:
         problem: the campaign and the model.
-        name: the candidate.
         start: parameters near the best.
         expected: (S,) change of the statistics at `start`; recordings without a change are not simulated.
         white: s^2 of the unit at `start`, over the refit's.
@@ -160,9 +159,6 @@ def _rescaling(
     """The way from a trial to a better strength.
 
     Args:
-        problem: the problem.
-        name: the effect.
-        trial: the trial.
         predicted: its prediction.
         least: misfit above which the effect is useless.
         before: the way to the trial, which gives the slope with it.
@@ -205,7 +201,6 @@ def until_visible(name: str, parameters: dict[str, float], size: float, visible:
     """Raise a strength until it shows by twice `visible` noises, or to the end of its bounds.
 
     Args:
-        name: the effect.
         parameters: its parameters, which are returned where the effect shows.
         size: noises by which it shows.
         visible: noises by which it has to show.

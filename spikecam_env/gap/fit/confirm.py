@@ -24,8 +24,6 @@ def confirmed(problem: Problem, fitted: Fit, count: int | None = None) -> Fit:
     """The fit simulated with more draws, on the recordings held out as well.
 
     Args:
-        problem: the problem of the fit.
-        fitted: the fit.
         count: number of twins, more where its effects need more; default: as many as confirm a candidate.
     """
     twins = problem.settings.twins

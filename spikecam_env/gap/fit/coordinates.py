@@ -44,9 +44,6 @@ def interval_of(name: str, key: str, value: float, sd: float, *, by_steps: bool 
     """90 % interval of a parameter, by a normal error of its coordinate, within the parameter's range.
 
     Args:
-        name: the effect.
-        key: the parameter.
-        value: its value.
         sd: its standard deviation, as of `error_of`.
         by_steps: whether it was fitted as it is, and not by its logarithm; a value of 0 always was.
 

@@ -68,10 +68,8 @@ def descend(
     taken if it promises little and is as long as a step may be.
 
     Args:
-        problem: the problem.
         probe: predicts the statistics of a model.
         model: the model to start from.
-        base: its unit.
         free: parameters to move.
         to_step: misfit that a step has to promise, and the step before to have removed; default: that of a chosen
             effect.
@@ -139,10 +137,7 @@ def derivatives(
     if one of them clearly moves it.
 
     Args:
-        problem: the problem.
         probe: predicts the statistics of a model.
-        model: the model.
-        base: its unit.
         at: the prediction of the model.
         free: the n parameters.
 
@@ -200,8 +195,6 @@ def derivative_step(name: str, key: str, peak: float, shows: float) -> float:
     """Step of a logarithm to take a derivative by, long enough to show above the twins' own noise.
 
     Args:
-        name: the effect.
-        key: the parameter.
         peak: noises by which the effect shows.
         shows: noises by which the step has to show.
     """

@@ -28,7 +28,6 @@ def refined_together(problem: Problem, fitted: Fit, names: Sequence[str]) -> tup
 
     Args:
         problem: before any effect was added.
-        fitted: the fit.
         names: its effects.
 
     Returns:

@@ -110,8 +110,6 @@ def linear_minimum(problem: Problem, fitted: Fit, slopes: Slopes, before: Floats
     A single step of `step_of` is shorter by its damping and its robust weights, which are no error of the parameters.
 
     Args:
-        problem: the problem of the fit.
-        fitted: the fit.
         slopes: derivatives at the fit.
         before: (n,) standard deviations of the logarithms, as `step_of` takes them.
 

@@ -52,7 +52,6 @@ class Problem:
 
         Args:
             model: the model with those effects.
-            base: its unit.
             predicted: its prediction.
         """
         return replace(self, case=replace(self.case, base=base), model=model, null=standing_on(self.null, predicted))
@@ -85,7 +84,6 @@ class Problem:
         """Recordings that effects concern, by index (`recordings_affected`).
 
         Args:
-            names: the effects.
             change: (S,) change of the statistics; None: it may be everywhere.
         """
         everywhere = np.full(len(self.null.keys), np.inf)

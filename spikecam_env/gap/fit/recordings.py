@@ -30,8 +30,6 @@ def recordings_affected(case: Case, names: Sequence[str], null: Null, measured: 
     that leave steady uniform light alone need only the others, unless the refit rests on one of these.
 
     Args:
-        case: the campaign.
-        names: the effects.
         null: the prediction without them.
         measured: (S,) statistics.
         effect: (S,) change of the statistics by the effects.

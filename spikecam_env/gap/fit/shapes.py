@@ -28,9 +28,7 @@ def with_shapes_to_fit(problem: Problem, before: float, fits: Sequence[Fit]) -> 
     None of them where a fit without other parameters leaves less, and no more than chance.
 
     Args:
-        problem: the problem of the fits.
         before: misfit of the model itself.
-        fits: the fits.
     """
     least = min((f.misfit for f in fits), default=np.inf)
     simple = min((f for f in fits if not candidate(f.name).has_shapes), key=lambda f: f.misfit, default=None)

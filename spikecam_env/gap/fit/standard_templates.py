@@ -50,7 +50,6 @@ def templates_of(names: Sequence[str], *, jobs: int = 1, progress: bool = False)
     """The shipped templates, with those of candidates in `names` that have none of their present law.
 
     Args:
-        names: the candidates.
         jobs: threads, which change no bit.
         progress: show a bar where something has to be simulated.
     """
@@ -94,7 +93,6 @@ def entries_of(
 
     Args:
         standard: the standard case.
-        name: the candidate.
         kept: called with the label of each and the function that makes it; returns the template.
     """
     strength = CATALOGUE[name].strength

@@ -54,7 +54,6 @@ def conclude_maps(
     """The verdict of a search.
 
     Args:
-        case: the maps.
         tested: the model under test.
         null: its prediction.
         values: (S,) measured statistics.

@@ -31,7 +31,6 @@ def diagnose_maps(
     """Find the fixed pattern that a model lacks, from rates alone.
 
     Args:
-        campaign: the campaign.
         model: the model under test.
         names: names of the candidates.
         seed: as in `diagnose.diagnose`.

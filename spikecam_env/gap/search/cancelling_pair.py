@@ -32,7 +32,6 @@ def fit_pair(problem: Problem, names: Collection[str]) -> Fit | None:
 
     Args:
         problem: the problem before any effect was added.
-        names: the candidates.
 
     Returns:
         A fit of the second whose model has both.  None if the strength has the wrong sign, or if one of them is no

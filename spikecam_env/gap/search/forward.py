@@ -59,8 +59,6 @@ def forward_selection(problem: Problem, names: Sequence[str], templates: Templat
 
     Args:
         problem: the problem of the model as given.
-        names: the candidates.
-        templates: their templates.
 
     Returns:
         The rounds that added an effect, and a last one with the final model.
@@ -110,9 +108,6 @@ def with_candidates(problem: Problem, here: Problem, names: Sequence[str], templ
     Args:
         problem: the problem of the model as given.
         here: the problem with the effects of earlier rounds.
-        names: the candidates.
-        templates: their templates.
-        turn: the round.
     """
     null, seen = here.null, here.seen
     left = [n for n in names if n not in {e.name for e in turn.model.effects}]

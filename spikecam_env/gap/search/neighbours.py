@@ -43,7 +43,6 @@ def try_other_starts(
     """Fit a candidate from other starts than that of its best fit, and its shape from the best of them.
 
     Args:
-        problem: the problem of the fits.
         fitted: its best fit.
         before: misfit without it.
         screened: all starts, the best first.
@@ -130,7 +129,6 @@ def try_in_place_of_last(problem: Problem, last: Round, errors: Errors, names: S
 
     Args:
         problem: the model as given.
-        last: the round.
         errors: of all parameters, beside the best.
         names: names of all effects, the round's last.
 
@@ -154,7 +152,6 @@ def runner_up(turn: Round, names: Sequence[str], same_share: float) -> list[Fit]
     Earlier effects may have taken its share when the two were compared.
 
     Args:
-        turn: the round.
         names: names of all effects, the round's last.
         same_share: share of the best's misfit that it has to have removed.
     """
@@ -210,8 +207,6 @@ def try_cancelling_pair(problem: Problem, names: Sequence[str], rounds: list[Rou
 
     Args:
         problem: the model as given.
-        names: the candidates.
-        rounds: rounds of the search.
 
     Returns:
         Rounds that find the two, if they leave less misfit than the search by `Deviance.accept`; else `rounds`.

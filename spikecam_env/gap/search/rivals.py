@@ -52,7 +52,6 @@ def most_likely(null: Null, best: Prediction, other: Prediction) -> tuple[Floats
     Otherwise the chance of its few twins would count as its law.
 
     Args:
-        null: the null model.
         best: prediction of the best candidate.
         other: prediction of the other.
 
@@ -73,7 +72,6 @@ def lead(null: Null, seen: Floats, best: Prediction, other: Prediction) -> float
     the logarithm of the variance would decide.
 
     Args:
-        null: the null model.
         seen: (S,) statistics.
         best: prediction of one candidate.
         other: prediction of the other.

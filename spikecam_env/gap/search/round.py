@@ -54,10 +54,6 @@ def is_second_bend(turn: Round, fitted: Fit) -> bool:
     """Whether a fit bends the rate curve beside an effect that bends it too.
 
     A bend fits the error of another, so it has to remove as much misfit as a first effect.
-
-    Args:
-        turn: the round.
-        fitted: the fit.
     """
     return candidate(fitted.name).bends_response and any(candidate(e.name).bends_response for e in turn.model.effects)
 
@@ -92,7 +88,6 @@ def is_improvement(null: Null, before: float, best: Fit, later: bool, weak: bool
     """Whether a joint fit of all effects is an improvement: it leaves less misfit by `Deviance.accept`.
 
     Args:
-        null: the null model.
         before: misfit without the newest effect, which other twins would change by some ten.
         best: the joint fit.
         later: whether there were effects before.  Such a fit, where it leaves nothing significant, may leave as much.
@@ -108,7 +103,6 @@ def is_small_share(turn: Round, left: float, chance: float, later: bool, searchi
     """Whether a misfit is little less than at the start of a round, as a stand-in's is.
 
     Args:
-        turn: the round.
         left: the misfit.
         chance: misfit of noise alone.
         later: whether there are earlier effects.

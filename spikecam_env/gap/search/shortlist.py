@@ -39,8 +39,6 @@ def screened_beside(here: Problem, names: Sequence[str], templates: Templates) -
 
     Args:
         here: the problem, with the effects before.
-        names: the candidates.
-        templates: their templates.
     """
     null, shown = here.null, here.case.conditions
     screened = screen(templates, shown, null, here.seen, names, line_of(here.case))
@@ -99,7 +97,6 @@ def fits_of(problem: Problem, before: float, starts: Sequence[Screened]) -> tupl
     """Fit candidates from their starts.
 
     Args:
-        problem: the problem.
         before: misfit without any.
         starts: starts by templates, several for a candidate.
 

@@ -49,7 +49,6 @@ def bounds(
     of its size.
 
     Args:
-        case: the campaign.
         model: the model that explains it.
         null: the prediction of that model.
         measured: (S,) statistics.

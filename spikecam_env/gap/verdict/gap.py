@@ -14,8 +14,6 @@ def gap_of(case: Case, null: Null, values: Floats, given: Floats, after: Predict
     """The gap of the model as given, and of the model with the effects; each in its own noise.
 
     Args:
-        case: the campaign.
-        null: the null model.
         values: (S,) measured statistics.
         given: (S,) predictions of the model as given.
         after: prediction of the model with the effects.

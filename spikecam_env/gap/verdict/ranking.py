@@ -17,7 +17,6 @@ def ranking(rounds: Sequence[Round], found: Sequence[tuple[Fit, Round]], accept:
     """Every fit of every round: the one that was kept, then the others, the smallest misfit first.
 
     Args:
-        rounds: rounds of the search.
         found: fits that were kept, with their rounds.
         accept: reduction in misfit that an effect has to make.
     """

@@ -27,9 +27,7 @@ def explains(null: Null, values: Floats, predicted: Prediction) -> bool:
     share of its change, and would make the remainder look small.
 
     Args:
-        null: the null model.
         values: (S,) measured statistics.
-        predicted: the prediction.
     """
     off, limits = is_left(null, values, predicted), null.settings.concluding
     before, after = (in_noise(null, values, mean) for mean in (null.mean, predicted.mean))
@@ -47,9 +45,7 @@ def remainder_of(
     """The remainder of a prediction; None where it leaves no more than chance.
 
     Args:
-        null: the null model.
         values: (S,) measured statistics.
-        predicted: the prediction.
         where: part of the array, for `Remainder`.
         when: part of the time, for `Remainder`.
     """

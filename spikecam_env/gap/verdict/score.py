@@ -119,7 +119,6 @@ class EffectProbe:
         By few campaigns, and at least the variance without the effect and that of the number of events.
 
         Args:
-            score: the score.
             scores: (n,) scores of campaigns with the effect.
             excess: their mean less that without the effect.
             events: expected number of events.
@@ -249,7 +248,6 @@ def linear(
     Statistics of unknown noise do not count, such as those of a pattern in the dark without a spike.
 
     Args:
-        null: the null model.
         change: (S,) change of the statistics at `parameters`.
         without: statistics (S,) of campaigns without the effect.
         parameters: parameters of the effect.

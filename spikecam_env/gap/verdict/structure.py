@@ -24,8 +24,6 @@ def structure(case: Case, null: Null, off: Floats) -> dict[str, Any]:
     """The description of a discrepancy, as in `unknown` of diagnosis.json.
 
     Args:
-        case: the campaign.
-        null: the null model.
         off: (S,) measured less predicted, in noise, under the null model.
     """
     kind = {c.name: c.kind for c in case.conditions}
@@ -78,7 +76,6 @@ def level_exponent(null: Null, off: Floats, kind: dict[str, str], level: dict[st
     """Slope of log |statistic| on log level over the flats, of the statistic that is clearly off on most of them.
 
     Args:
-        null: the null model.
         off: (S,) distances, in noise.
         kind: kind of each recording.
         level: level of each recording.

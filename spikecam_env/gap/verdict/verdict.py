@@ -82,7 +82,6 @@ def verdict_of(
 
     Args:
         comparison: the measurement beside the null model.
-        rounds: rounds of the search.
         found: effects that were kept, with their rounds.
         explained: whether the last round leaves chance, or a remainder.
         remainder: the remainder, if there is one.
@@ -105,7 +104,6 @@ def parameters_off(comparison: Comparison, rounds: Sequence[Round]) -> dict[str,
 
     Args:
         comparison: the measurement beside the null model.
-        rounds: rounds of the search.
 
     Returns:
         {effect: {measured, nominal, ratio}}, in the unit of the effect's strength.
@@ -139,10 +137,7 @@ def off_beside(case: Case, tested: SensorModel, last: Round, unit: BaseFit) -> O
     The added patterns, and not the model's own spreads, explain how pixels differ.
 
     Args:
-        case: the campaign.
         tested: the model under test.
-        last: the last round.
-        unit: the unit.
     """
     patterns = (e for e in last.model.effects if candidate(e.name).is_pattern)
     return off_nominal(case, reduce(SensorModel.with_effect, patterns, tested), unit)
@@ -165,10 +160,7 @@ def with_stand_ins(case: Case, null: Null, values: Floats, rounds: Sequence[Roun
     smallest held-out gap: an empirical patch has to be of use in recordings that took no part.
 
     Args:
-        case: the campaign.
-        null: the null model.
         values: (S,) measured statistics.
-        rounds: rounds of the search.
     """
     *before, last = rounds
     explaining = [r for r in rounds[1:] if explains(null, values, r.prediction)]
@@ -192,7 +184,6 @@ def with_given_parameters(problem: Problem, tested: SensorModel, rounds: Sequenc
     Args:
         problem: the problem of the null model.
         tested: the model under test.
-        rounds: rounds of the search.
     """
     *before, last = rounds
     null, values, names = problem.null, problem.values, {e.name for e in last.model.effects}
