@@ -1,7 +1,7 @@
-"""Do two engines follow one law?  Two-sample tests on what two cameras show, pixel by pixel.
+"""Do two engines follow one law?  Two-sample tests on the spikes of two cameras, pixel by pixel.
 
 Every test takes one value a pixel, so its samples are independent, and compares two histograms by chi-square.
-Blind to: what lies beyond the first spikes observed, and dependence over more than three intervals.
+Blind to spikes beyond the first ones, and to dependence over more than three intervals.
 """
 
 from __future__ import annotations
@@ -24,12 +24,14 @@ _LEVELS = 12
 
 @dataclass(frozen=True)
 class Observation:
-    """spike: (P, n) int64 frame of each pixel's first n spikes, -1 where it came too late; count: (P,) spikes in all;
-    word: (P,) frames 8 .. 24 as sixteen bits."""
+    """Spikes of P pixels."""
 
     spike: NDArray[np.int64]
+    """(P, n) frames of the first n spikes, -1 where one came too late."""
     count: NDArray[np.int64]
+    """(P,) number of spikes."""
     word: NDArray[np.int64]
+    """(P,) frames 8 .. 24 as sixteen bits."""
 
     @property
     def interval(self) -> NDArray[np.int64]:
@@ -38,7 +40,7 @@ class Observation:
 
 
 def observe(sensor: SpikeSensor, light: Keyframes | ArrayLike, frames: int, spikes: int = 5) -> Observation:
-    """Run a sensor for `frames` frames, keeping what the tests need."""
+    """Run a sensor for `frames` frames, and keep the first spikes, the counts and a word of each pixel."""
     pixels = sensor.shape[0] * sensor.shape[1]
     spike = np.full((pixels, spikes), -1, dtype=np.int64)
     count = np.zeros(pixels, dtype=np.int64)

@@ -2,7 +2,7 @@
 
     python -m benchmarks.blind_trial --set quick --part tune --jobs 2 --out trial
 
-It runs in a checkout: what hides the effects is in `tests/hidden_world`, which is not installed.
+It runs in a checkout: the hidden effects are in `tests/hidden_world`, which is not installed.
 """
 
 from __future__ import annotations
@@ -29,8 +29,8 @@ from tests.hidden_world.cases import cases
 class BlindTrial:
     """Generate campaigns with hidden effects, diagnose them, open the keys and score.
 
-    What is done already in OUT is not done again; trial.md has the figures so far at any time, of cases in the order
-    of their opaque ids, a fair sample.  The part `report` is for figures: do not tune on it.
+    Cases that are done in OUT are not repeated.  trial.md has the figures so far at any time, of cases in the order of
+    their opaque ids, a fair sample.  The part `report` is for figures: do not tune on it.
 
     example:  python -m benchmarks.blind_trial --set quick --part tune --jobs 2 --out trial
     """
@@ -52,11 +52,11 @@ class BlindTrial:
     limit: Count | None = None
     """At most so many cases of each group."""
     record: Path | None = None
-    """File that holds all results, a line each: what it has is not done again, and what is done is written to it."""
+    """File of all results, a line each: its cases are not repeated, and new ones are added."""
     keep: bool = False
     """Keep the campaigns' data (some 100 MB each)."""
     diagnose: str = "benchmarks.blind_trial:diagnosed"
-    """module:function that is tried: (campaign, model, out, seed, exclude, threads) -> what diagnosis.json holds."""
+    """module:function that is tried: (campaign, model, out, seed, exclude, threads) -> content of diagnosis.json."""
 
     def run(self) -> None:
         with run_folder(self.out, "a trial"):
@@ -108,9 +108,9 @@ def diagnosed(
         from spikecam_env.gap.report.page import write_report
     except ImportError as error:
         raise ImportError(f"this checkout has no spikecam_env.gap.diagnose to be tried ({error})") from error
-    found = diagnose(campaign, model, seed=seed, exclude=exclude, jobs=threads, progress=False)
-    found.write(out)
-    write_report(found, out / "report.html")
+    diagnosis = diagnose(campaign, model, seed=seed, exclude=exclude, jobs=threads, progress=False)
+    diagnosis.write(out)
+    write_report(diagnosis, out / "report.html")
     written: dict[str, Any] = json.loads((out / "diagnosis.json").read_text(encoding="utf-8"))
     return written
 

@@ -1,13 +1,13 @@
-"""Whether upper bounds hold: of campaigns with an effect as strong as its bound, how many are told a bound below it.
+"""Whether upper bounds hold: the share of campaigns with an effect at its bound that state a smaller bound.
 
     python -m benchmarks.bound_coverage --trials 20 --jobs 2 --out table.json
 
 A campaign with nothing hidden states a bound of every candidate.  Then each effect is hidden at its bound in TRIALS
-campaigns of other cameras, and each states its own bound.  It covers where that is no smaller, where the effect has
-none there, or where the alarm rings: a diagnosis then goes on to look for what is wrong, and states no bound.
+campaigns of other cameras, and each states its own bound.  A bound covers if it is no smaller, if there is none, or if
+the alarm rings: a diagnosis then searches for the fault, and states no bound.
 
-What is in the file is not done again; it is written after every trial.  95 % is asked of the whole, 90 % of each effect
-(of 20 trials, 18).
+Trials in the file are not repeated; it is written after every trial.  The limit is 95 % of all trials, and 90 % of each
+effect's (of 20 trials, 18).
 """
 
 from __future__ import annotations
@@ -53,12 +53,14 @@ CAMERA = 1000
 
 @dataclass(frozen=True)
 class Trial:
-    """One campaign with an effect hidden.  below: its bound, None where it has none; alarm: whether it rings."""
+    """One campaign with an effect hidden."""
 
     name: str
     number: int
     below: float | None
+    """The bound that it states; None without one."""
     alarm: bool
+    """Whether the alarm rings."""
 
 
 def recorded(model: SensorModel, camera: int) -> Case:
@@ -74,7 +76,7 @@ def recorded(model: SensorModel, camera: int) -> Case:
 
 
 def judged(case: Case) -> tuple[Null, np.ndarray]:
-    """What the model without the effect predicts, and the campaign's statistics."""
+    """The prediction of the model without the effect, and the campaign's statistics."""
     null = model_null(case, MODEL, TWINS)
     return null, values_of(case.bank, null.keys)
 
@@ -100,7 +102,6 @@ def trial(bound: Bound, number: int) -> Trial:
 
 def _of_shape(bound: Bound) -> Templates:
     """The templates, of the effect those of the bound's shape alone."""
-
     shipped = shipped_templates()
     alike = [
         e for e in shipped.weakest if e.name == bound.name and all(e.parameters[k] == v for k, v in bound.at.items())
@@ -142,25 +143,32 @@ def wilson(successes: int, trials: int, z: float = 1.96) -> tuple[float, float]:
 
 
 def main(out: Path, trials: int = 20, jobs: int = 1, only: tuple[str, ...] = ()) -> None:
-    """Write and print the table.  out: file (.json) that holds what is done.  only: effects; default all."""
+    """Write and print the table.
+
+    Args:
+        out: file (.json) of the trials.
+        trials: trials of each effect.
+        jobs: trials at once.
+        only: effects; default all.
+    """
     kept = json.loads(out.read_text(encoding="utf-8")) if out.exists() else {"bounds": [], "trials": []}
-    found = [Bound(**b) for b in kept["bounds"]] or stated()
+    known = [Bound(**b) for b in kept["bounds"]] or stated()
     done = [Trial(**t) for t in kept["trials"]]
     have = {(t.name, t.number) for t in done}
-    left = [(b, n) for n in range(trials) for b in found if (b.name, n) not in have and (not only or b.name in only)]
+    left = [(b, n) for n in range(trials) for b in known if (b.name, n) not in have and (not only or b.name in only)]
     with ProcessPoolExecutor(jobs, mp_context=get_context("spawn")) as pool:
-        running = [pool.submit(trial, *what) for what in left]
+        running = [pool.submit(trial, *job) for job in left]
         for one in tqdm(as_completed(running), "trials", len(running)):
             done.append(one.result())
-            now = {"bounds": [asdict(b) for b in found], "trials": [asdict(t) for t in done]}
+            now = {"bounds": [asdict(b) for b in known], "trials": [asdict(t) for t in done]}
             write_text_whole(out, json.dumps(now, indent=1))
-    print(table(list(rows(found, done))))
+    print(table(list(rows(known, done))))
     covered = [
-        t.alarm or t.below is None or t.below >= 0.999 * b.below for b in found for t in done if t.name == b.name
+        t.alarm or t.below is None or t.below >= 0.999 * b.below for b in known for t in done if t.name == b.name
     ]
     if covered:
         low, high = wilson(sum(covered), len(covered))
-        alone = sum(covers(b, replace(t, alarm=False)) for b in found for t in done if t.name == b.name)
+        alone = sum(covers(b, replace(t, alarm=False)) for b in known for t in done if t.name == b.name)
         print(f"together {sum(covered)} of {len(covered)}: {100 * low:.1f} to {100 * high:.1f} %; bounds alone {alone}")
 
 

@@ -1,4 +1,4 @@
-"""How true presets are to the real recordings: static wall pixels, and the flat maps' distributions.
+"""Presets beside the real recordings: static wall pixels, and the flat maps' distributions.
 
 python -m benchmarks.check_measured REAL
 """
@@ -7,29 +7,29 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 import tyro
 from numpy.typing import NDArray
 from tqdm import tqdm
 
-from benchmarks.clock_locking import Locking, clock_locking
 from spikecam_env.calibration.flat_maps import counted, read_flat_maps, spread_counts
-from spikecam_env.calibration.real import (
+from spikecam_env.calibration.spike_times import plausible_rates
+from spikecam_env.sensor import SensorModel, SpikeSensor
+from spikecam_env.types import Floats
+from tools.real.recordings import (
     MAPS,
     MAPS_FRAME_RATE_HZ,
     QUANTILES,
     STEPS,
     WallStatistics,
-    plausible_rates,
     read_response_and_dark,
     read_wall,
     wall_statistics,
 )
-from spikecam_env.calibration.two_levels import response_and_dark, two_levels
-from spikecam_env.calibration.wall_noise import excess_covariance
-from spikecam_env.sensor import SensorModel, SpikeSensor
-from spikecam_env.types import Floats
+from tools.real.two_levels import response_and_dark, two_levels
+from tools.real.wall_noise import excess_covariance
 
 MODELS = ("measured", "scsim", "physical", "ideal")
 MAP_MODELS = ("measured", "scsim", "physical")
@@ -39,26 +39,49 @@ _JITTER = 4e-5
 """s^2 with which rates are drawn; it matters little beside reading in whole frames."""
 
 
+_WHOLE = 0.005
+"""Largest distance of a mean interval from a whole one, of pixels that may follow the clock [frames]."""
+
+
+class ClockLocking(NamedTuple):
+    """How far pixels of whole intervals follow the read-out's clock.
+
+    Free of the clock, a spike comes a frame late, the next one back on time, as often as early.
+    """
+
+    pixels: float
+    """Number of pixels within _WHOLE of a whole mean interval."""
+    late: float
+    """Spikes a frame late after which the next is back on time, of 10 000."""
+    early: float
+    """Spikes a frame early, likewise."""
+
+
 @dataclass(frozen=True)
 class SimulatedWall:
-    """Statistics of one model's camera at the wall's rates, means over takes.  excess_sd: standard error of the mean.
-
-    chi2: of the wall's 40 values of excess about this model's, with the covariance of both.
-    """
+    """Statistics of one model's camera at the wall's rates, means over takes."""
 
     model: str
     excess: Floats
     excess_sd: Floats
+    """Standard errors of `excess`."""
     chi2: float
+    """chi2 of the wall's 40 values of excess about this model's, with the covariance of both."""
     minimum_range: Floats
+    """Percentiles of the pixels."""
     variance_excess: float
-    locking: Locking
+    locking: ClockLocking
 
 
 def simulated_wall(model: SensorModel | str, wall: WallStatistics, shape: tuple[int, int], takes: int) -> SimulatedWall:
-    """A unit of the model in light that gives its pixels rates the wall's may have had (`plausible_rates`).
+    """Simulate the wall with a unit of a model, at rates that agree with the wall's (`plausible_rates`).
 
-    shape: rows, columns of the wall.  Pixels whose dark level alone exceeds the wall's rate get no light.
+    Pixels whose dark level alone exceeds the wall's rate get no light.
+
+    Args:
+        wall: statistics of the real wall.
+        shape: rows and columns of the wall.
+        takes: number of takes.
     """
     runs, locking = [], []
     for take in range(takes):
@@ -77,8 +100,27 @@ def simulated_wall(model: SensorModel | str, wall: WallStatistics, shape: tuple[
         float(gap @ np.linalg.solve(covariance + spread, gap)),
         np.mean([np.percentile(r.minimum_range, PERCENTILES) for r in runs], axis=0),
         float(np.mean([r.variance_excess for r in runs])),
-        Locking(*np.mean(locking, axis=0)),
+        ClockLocking(*np.mean(locking, axis=0)),
     )
+
+
+def clock_locking(spikes: NDArray[np.uint8], rate: Floats) -> ClockLocking:
+    """Count late and early spikes of steady light.
+
+    Args:
+        spikes: (T, rows, columns) spikes.
+        rate: (P,) measured rates of the pixels [spikes/frame].
+    """
+    streams = spikes.reshape(len(spikes), -1)
+    interval = 1.0 / rate
+    near = np.flatnonzero(np.abs(interval - np.round(interval)) < _WHOLE)
+    total = late = early = 0
+    for pixel in near:
+        off = np.diff(np.flatnonzero(streams[:, pixel])) - round(float(interval[pixel]))
+        total += off.size
+        late += int(np.sum((off[:-1] == 1) & (off[1:] == -1)))
+        early += int(np.sum((off[:-1] == -1) & (off[1:] == 1)))
+    return ClockLocking(float(near.size), 1e4 * late / max(total, 1), 1e4 * early / max(total, 1))
 
 
 def record_wall(
@@ -93,8 +135,13 @@ def record_wall(
 def flat_quantiles(model: SensorModel | str, light: Floats, dark: Floats, seed: int = 0) -> list[dict[str, object]]:
     """Rows of measured and modelled quantiles of dark level and response, and their ratio less one.
 
-    light, dark: (H, W) rates of the real maps.  The model's light is scaled to the same median response.  Dark levels
-    of both are counts, spread evenly within a count: a tenth of the pixels have ten spikes or fewer in the dark.
+    The model's light is scaled to the same median response.  Dark levels of both are counts, spread evenly within a
+    count: a tenth of the pixels have ten spikes or fewer in the dark.
+
+    Args:
+        light: (H, W) rates of the real maps in light, less the dark's.
+        dark: (H, W) rates in the dark.
+        seed: seed of the unit.
     """
     camera, response, modelled = modelled_maps(model, light, seed)
     rows: list[dict[str, object]] = []

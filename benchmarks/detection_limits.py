@@ -43,10 +43,10 @@ def measured(only: Sequence[str] = ()) -> dict[str, float]:
     wanted = set(only or [*HIDDEN, "excess_threshold_noise"])
     by_name: dict[str, list[float]] = {}
     templates = shipped_templates()
-    told = heard(templates.keys)
+    used = heard(templates.keys)
     for entry in templates.weakest:
         power = 1.0 / candidate(entry.name).power
-        peak = float(np.abs(entry.shift[told]).max())
+        peak = float(np.abs(entry.shift[used]).max())
         strength = abs(entry.parameters[CATALOGUE[entry.name].strength])
         by_name.setdefault(entry.name, []).append(strength * (CLEAR / peak) ** power)
     limits = {name: float(np.median(values)) for name, values in by_name.items() if name in wanted & set(HIDDEN)}
@@ -73,17 +73,17 @@ def of_pattern(names: list[str], near: dict[str, float]) -> dict[str, float]:
     if not names:
         return {}
     case, model, null = standard_case()
-    told = heard(null.keys)
-    found = {}
+    used = heard(null.keys)
+    limits = {}
     for name in names:
         key = CATALOGUE[name].strength
         for strength in near[name] * np.geomspace(0.02, 5.0, 60):
             tried = with_effect(model, name, bounded(name, {key: strength}))
-            shift = ((with_drawn_pattern(case, tried, null, null.prediction).mean - null.mean) / null.noise)[told]
-            found[name] = float(strength)
+            shift = ((with_drawn_pattern(case, tried, null, null.prediction).mean - null.mean) / null.noise)[used]
+            limits[name] = float(strength)
             if np.abs(shift).max() > CLEAR:
                 break
-    return found
+    return limits
 
 
 def written(text: str, limits: dict[str, float]) -> str:

@@ -102,7 +102,7 @@ class RecordedCamera:
         self._out = torch.empty((1, BLOCK, phase.size), dtype=torch.uint8, device=device)
         self._block = captured(self._exposed, device)
         for tensor, before in zip(self._pixels.tensors, fresh, strict=True):
-            tensor.copy_(before)  # a recording runs what it records
+            tensor.copy_(before)  # a recording also runs its calls
 
     def step(self) -> torch.Tensor:
         """(BLOCK, H, W) the next frames."""
@@ -227,8 +227,10 @@ def one_frame(sizes: Sizes, device: torch.device) -> Rows:
 
 
 def environments(sizes: Sizes, device: torch.device) -> Rows:
-    """Vectors of `Track`, 40 frames a step: env-steps/s, and ms a step of light, camera, and what agents see (each
-    waited for), the rest being the host's."""
+    """Vectors of `Track`, 40 frames a step: env-steps/s, and ms a step of light, camera and observation.
+
+    Each part is waited for; the rest is the host's.
+    """
     rows = []
     for obs in ("tfp", "rate"):
         env: Any = gymnasium.make_vec(
@@ -424,7 +426,7 @@ def _seconds(run: Callable[[], object], device: torch.device) -> float:
 
 
 def _wait(device: torch.device) -> None:
-    """Until the device has done what it was given."""
+    """Wait until the device is idle."""
     if device.type == "cuda":
         torch.cuda.synchronize(device)
 

@@ -6,7 +6,7 @@ Each of `HIDDEN` is hidden in SEEDS small cameras, and each campaign is diagnose
 counts where its effect is named.  Its width is compared with that of the same parameter of the same campaign at the
 largest effort.
 
-What is in the file is not done again; it is written after every campaign.
+Campaigns in the file are not repeated; it is written after every campaign.
 """
 
 from __future__ import annotations
@@ -89,7 +89,7 @@ class Stated:
     sd: float | None
     """Its standard deviation."""
     skipped: str
-    """What was left out to stay within the effort; empty where nothing was."""
+    """Steps that were left out to stay within the effort; empty where none was."""
 
     @property
     def contains(self) -> bool:
@@ -112,28 +112,28 @@ def diagnosed(case: int, seed: int, efforts: Sequence[float]) -> list[Stated]:
             Path(folder, "camera"), model, shape=SHAPE, frames=FRAMES, recordings=DESIGN, seed=FIRST_CAMERA + seed
         )
         done: list[Stated] = []
-        found = None
+        diagnosis = None
         for effort in sorted(efforts):
-            if found is None or unfinished_note(found):
-                found = diagnose(campaign, MODEL, candidates=CANDIDATES, effort=effort, seed=seed, progress=False)
-            done += stated_by(found, case, seed, effort)
+            if diagnosis is None or unfinished_note(diagnosis):
+                diagnosis = diagnose(campaign, MODEL, candidates=CANDIDATES, effort=effort, seed=seed, progress=False)
+            done += stated_by(diagnosis, case, seed, effort)
         return done
 
 
-def unfinished_note(found: Diagnosis) -> str:
+def unfinished_note(diagnosis: Diagnosis) -> str:
     """The note on steps that were skipped to stay within the effort; empty where none was."""
-    return next((note for note in found.data if "--effort" in note), "")
+    return next((note for note in diagnosis.data if "--effort" in note), "")
 
 
-def stated_by(found: Diagnosis, case: int, seed: int, effort: float) -> Iterator[Stated]:
+def stated_by(diagnosis: Diagnosis, case: int, seed: int, effort: float) -> Iterator[Stated]:
     """Every fitted parameter of the hidden effects, as a diagnosis states it."""
-    named = {effect.name: effect.parameters for effect in found.effects} if found.verdict == "named" else {}
+    named = {effect.name: effect.parameters for effect in diagnosis.effects} if diagnosis.verdict == "named" else {}
     for name, parameters in HIDDEN[case].items():
         for key in candidate(name).fitted:
             estimate = named.get(name, {}).get(key)
             low, high = (estimate.interval if estimate else None) or (None, None)
             value, sd = (float(estimate.value), float(estimate.sd)) if estimate else (None, None)
-            skipped = unfinished_note(found)
+            skipped = unfinished_note(diagnosis)
             yield Stated(case, seed, effort, name, key, parameters[key], value, low, high, sd, skipped)
 
 
@@ -176,7 +176,7 @@ def main(out: Path, seeds: int = 4, first_seed: int = 0, only: tuple[str, ...] =
     """Write and print the table.
 
     Args:
-        out: file (.json) that holds what is done.
+        out: file (.json) of the campaigns.
         seeds: cameras of each case.
         first_seed: number of the first.
         only: effects, one of which a case must hide; default all.

@@ -70,7 +70,7 @@ def main() -> int:
         "--out", type=Path, help="write every comparison: JSON, or a Markdown table where it ends in .md"
     )
     parser.add_argument("--page", type=Path, help="write the largest errors into this page, between its markers")
-    parser.add_argument("--all", action="store_true", help="print what agrees too")
+    parser.add_argument("--all", action="store_true", help="print comparisons that agree too")
     options = parser.parse_args()
     try:
         for path in filter(None, (options.out, options.page)):
@@ -138,7 +138,7 @@ def compare(case: Case, seed: int) -> Iterable[Row]:
 
 
 def summary(rows: list[Row], refusals: list[Refusal]) -> str:
-    """How many differ, of how many, what chance would give, and how many settings are refused."""
+    """Number of comparisons, of differences, of those by chance, and of refused settings."""
     worst = max(rows, key=lambda row: abs(row.comparison.z))
     differ = sum(not row.comparison.agrees for row in rows)
     by_chance = len(rows) * 2.0 * float(stats.norm.sf(LIMIT))
@@ -150,7 +150,7 @@ def summary(rows: list[Row], refusals: list[Refusal]) -> str:
 
 
 def largest_errors(rows: list[Row], refusals: list[Refusal]) -> str:
-    """A line an effect: how it acts within a frame, and the comparison with the largest |z|; and what is refused."""
+    """A line an effect: how it acts within a frame, and the comparison with the largest |z|; then refused settings."""
     lines = [
         f"{len(rows)} comparisons, {sum(not row.comparison.agrees for row in rows)} beyond abs(z) = {LIMIT:g}; "
         f"{len(refusals)} settings are refused.",

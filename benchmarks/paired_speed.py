@@ -3,8 +3,8 @@
     python -m benchmarks.paired_speed OLD_CHECKOUT [MODEL ...]      a model: PRESET or PRESET+EFFECT; by default MODELS
 
 Other programs on a machine slow a run by tens of per cent, and both of a pair by much the same.  One process a checkout
-does the same steps in turn, both on one core.  What is compared is the process's own CPU time.  ratio: the median over
-pairs of this checkout's time over the other's; error: that of the median, from its spread over pairs.
+does the same steps in turn, both on one core.  The process's own CPU time is compared.  ratio: the median over pairs of
+this checkout's time over the other's; error: that of the median, from its spread over pairs.
 """
 
 from __future__ import annotations

@@ -73,7 +73,7 @@ class RotatingDisk(PlanarScene):
         angle: at frame 0 [radians].
         motion_per_key: most the rim may move between two keys [pixels], as far as whole frames allow; the sensor blends
             two keys.  The light of a frame is 1.2 % rms off at 0.58 pixels a key (2000 rpm), 3.1 % at twice that
-            (`spikecam bench scenes`).
+            (`python -m benchmarks.scenes`).
 
     Raises:
         InputError: a value is out of range, by name.

@@ -17,18 +17,18 @@ import tyro
 from scipy import optimize, special
 
 from spikecam_env.calibration.flat_maps import LUX, counted, spread_counts
-from spikecam_env.calibration.real import (
+from spikecam_env.sensor import Circuit, SensorModel
+from spikecam_env.types import Floats
+from spikecam_env.whole import whole_file
+from tools.real.recordings import (
     MAPS_FRAME_RATE_HZ,
     QUANTILES,
     read_response_and_dark,
     read_wall,
     wall_statistics,
 )
-from spikecam_env.calibration.two_levels import split_shading
-from spikecam_env.calibration.wall_noise import OCTAVES, WallNoise, fit_wall_noise
-from spikecam_env.sensor import Circuit, SensorModel
-from spikecam_env.types import Floats
-from spikecam_env.whole import whole_file
+from tools.real.two_levels import split_shading
+from tools.real.wall_noise import OCTAVES, WallNoise, fit_wall_noise
 
 PRESET = Path(str(resources.files("spikecam_env.sensor"))) / "presets" / "measured.toml"
 
@@ -38,30 +38,30 @@ _HOT_RATES = (0.03, 0.05, 0.1)
 
 @dataclass(frozen=True)
 class Bowl:
-    """Shading 1 - falloff r^2 / r_corner^2 about a centre (shares of the array), as `vignetting` has it.
-
-    left: relative spread of the smooth part beside it.
-    """
+    """Shading 1 - falloff r^2 / r_corner^2 about a centre (shares of the array), as `vignetting` has it."""
 
     falloff: float
     centre_x: float
     centre_y: float
     left: float
+    """Relative spread of the smooth part beside it."""
 
 
 @dataclass(frozen=True)
 class MeasuredConstants:
-    """The preset's constants.  shading: relative spread of the smooth part; bowl: what describes it.
-
-    response_at_flat: median rate at 335 lux [spikes/frame].  dark_median [spikes/frame], dark_sigma: of the logarithm.
-    """
+    """The preset's constants."""
 
     shading: float
+    """Relative spread of the smooth part."""
     bowl: Bowl
+    """The fit of the shading."""
     pixel_spread: float
     response_at_flat: float
+    """Median rate at 335 lux [spikes/frame]."""
     dark_median: float
+    """Median dark level [spikes/frame]."""
     dark_sigma: float
+    """Standard deviation of the dark level's logarithm."""
     hot_fraction: float
     hot_mean: float
     noise: WallNoise

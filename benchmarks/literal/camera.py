@@ -1,6 +1,6 @@
 """From a sensor model's parameters to a literal camera: one function an effect, found by its name.
 
-Only values are read from the model; what they mean is written here from the effects' laws and the circuit:
+Only values are read from the model; their laws are written here anew, from the effects' laws and the circuit:
 
     threshold = (C + C_S)(V_d + V_S)        [electrons: N of the nominal one, in proportion]
     dark electrons of a frame = N I / (C V_d frame rate)
@@ -29,20 +29,22 @@ DENSE = 64
 class Camera:
     """One camera before it is exposed.
 
-    keys, levels: (K,) light over time [frames, thresholds a frame].  picture: (H, W) light of each pixel over that.
-    early: (H,) how long before the frame's end each row is read; jitter: (F + 1,) by how much each read-out is late
-    [frames].  offset_mV: (F * k, H or 1, W or 1) what is added to the thresholds.  reports: what happens to the bits,
-    in order.  law: the values of `Law` that are not 0.
+    Effects also set `early` (H,), the time from a row's read-out to the frame's end, and `jitter` (F + 1,), the delay
+    of each read-out [frames].  `offset_mV` (F * k, H or 1, W or 1) is added to the thresholds.
     """
 
     model: SensorModel
     frames: int
     shape: tuple[int, int]
     keys: Floats
+    """(K,) times of light [frames]."""
     levels: Floats
+    """(K,) light at the keys [thresholds a frame]."""
     picture: Floats
+    """(H, W) light of each pixel over `levels`."""
     rng: np.random.Generator
     law: dict[str, float] = field(default_factory=dict)
+    """The values of `Law` that are not 0."""
     trap_pA: float = 0.0
     noise_V: float = 0.0
     edge_V: float = 0.0
@@ -51,6 +53,7 @@ class Camera:
     share: float = 0.0
     full: float = 0.0
     reports: list[Callable[[Spikes], Spikes]] = field(default_factory=list)
+    """Changes of the bits, in order."""
 
     def __post_init__(self) -> None:
         circuit = self.model.circuit

@@ -1,7 +1,7 @@
-"""The settings at which every effect is compared, the hard ones among them, each with what shows it.
+"""The settings at which every effect is compared, the hard ones among them, each with its statistics.
 
-Few electrons make shot noise large and their simulation cheap; many of them show what noise would hide.  A frame is
-25 us, a threshold a frame 190 pA.
+Few electrons make shot noise large and their simulation cheap; many of them show small differences.  A frame is 25 us,
+a threshold a frame 190 pA.
 """
 
 from __future__ import annotations
@@ -52,21 +52,23 @@ Film = Callable[[int], tuple[Floats, Floats]]
 
 @dataclass(frozen=True)
 class Case:
-    """One setting.  effects: name -> parameters; the first is the one in question.  picture: light of each pixel of a
-    group over that of the film.  groups: independent groups of `shape` pixels, which make one camera side by side
-    unless `separate`: each of them then is a camera, as what all pixels of one have in common needs.
-    """
+    """One setting."""
 
     label: str
     film: Film
     effects: dict[str, dict[str, Any]]
+    """Parameters by effect; the first effect is compared."""
     statistics: tuple[Statistic, ...]
     electrons: float = 100.0
     shape: tuple[int, int] = (8, 8)
+    """Pixels of a group."""
     groups: int = 48
+    """Number of independent groups; they make one camera side by side unless `separate`."""
     frames: int = 300
     separate: bool = False
+    """Whether each group is a camera, for an effect that all pixels of a camera share."""
     picture: Floats = field(default_factory=lambda: np.ones((1, 1)))
+    """Light of each pixel of a group over that of the film."""
     quick: bool = False
 
     @property
@@ -83,7 +85,7 @@ class Case:
 
     @property
     def cameras(self) -> tuple[int, tuple[int, int]]:
-        """How many, and of what shape."""
+        """(number, shape) of the cameras."""
         rows, columns = self.shape
         return (self.groups, self.shape) if self.separate else (1, (rows, columns * self.groups))
 
@@ -174,7 +176,7 @@ def spot(rows: int, columns: int, low: float, high: float) -> Floats:
 # --- settings
 
 PATTERN = (RATE, SPREAD, *QUANTILES)
-"""What shows a fixed pattern."""
+"""Statistics of a fixed pattern."""
 
 
 def _light() -> list[Case]:

@@ -27,7 +27,7 @@ Places = NDArray[np.int64]
 
 
 class Law(NamedTuple):
-    """What all pixels of an array have in common; an effect that is absent is 0.
+    """Parameters that all pixels of an array share; an effect that is absent is 0.
 
     electrons: N, of a nominal threshold.  flicker_*, ripple_*: amplitude, cycles a frame, cycles at frame 0.
     beta: loss of the photodiode at one threshold a frame.  lag_*: share of late electrons, mean delay.
@@ -67,36 +67,47 @@ class Law(NamedTuple):
 
 
 class Pixels(NamedTuple):
-    """What each pixel has of its own, (H, W) float64: light over nominal, dark electrons a frame, electrons to its
-    threshold, relative noise of its reset; trapped (bool): whether it has a telegraph trap."""
+    """Parameters of each pixel, (H, W) float64."""
 
     gain: np.ndarray
+    """Light over nominal."""
     dark: np.ndarray
+    """Dark electrons a frame."""
     threshold: np.ndarray
+    """Electrons to the threshold."""
     kappa: np.ndarray
+    """Relative noise of a reset."""
     trapped: np.ndarray
+    """bool, whether it has a telegraph trap."""
 
 
 class Film(NamedTuple):
-    """Light over time: keys (K,) [frames] and levels (K,), linear between keys and constant outside;
-    most (F,): no frame's light, with a frame to either side, exceeds it."""
+    """Light over time, linear between keys and constant outside."""
 
     keys: np.ndarray
+    """(K,) times [frames]."""
     levels: np.ndarray
+    """(K,) light."""
     most: np.ndarray
+    """(F,) upper bound of the light of a frame and of the frames beside it."""
 
 
 class Nodes(NamedTuple):
-    """Where each pixel stands, (H, W): charge, threshold drawn at the last reset, time of it, time until which the node
-    is held, time until which a synchronous reset takes charge, electrons that are late, state of its trap."""
+    """State of each pixel, (H, W)."""
 
     charge: np.ndarray
     limit: np.ndarray
+    """Threshold that was drawn at the last reset."""
     fired: np.ndarray
+    """Time of the last reset."""
     held: np.ndarray
+    """Time until which the node is held."""
     swept: np.ndarray
+    """Time until which a synchronous reset takes charge."""
     late: np.ndarray
+    """Electrons that are late."""
     upper: np.ndarray
+    """State of its trap."""
 
 
 @njit(cache=True, error_model="numpy")
@@ -233,7 +244,7 @@ def live(
     """One pixel from `start` to `end`, in its frame n, with thresholds times `scale` plus `offset`.
 
     Where the threshold comes down to the charge, the reset clears the node, and nothing is left.  A threshold that is
-    drawn anew for a frame comes down at its start by convention, and what is above it then is kept.
+    drawn anew for a frame comes down at its start by convention, and charge above it is kept.
     """
     moving = law.ripple > 0.0 or law.edge != 0.0
     gain, own, read = law.electrons * pixels.gain[r, c], pixels.threshold[r, c], edges[n + 1, r]
@@ -319,10 +330,15 @@ def start(law: Law, pixels: Pixels, film: Film, first: float, rng: np.random.Gen
 def expose(
     law: Law, pixels: Pixels, film: Film, edges: Floats, offset: Floats, rng: np.random.Generator, spikes: Spikes
 ) -> None:
-    """spikes (F, H, W) uint8, zeros, are set.
+    """Set the bits of `spikes`.
 
-    edges: (F+1, H), when each row is read.  offset: (F * k, H, W), or 1 for any of the last two: what is added to the
-    thresholds in each k-th part of a frame [electrons].
+    Args:
+        law: parameters of the array.
+        pixels: parameters of the pixels.
+        film: the light.
+        edges: (F+1, H) times at which each row is read.
+        offset: (F * k, H or 1, W or 1) added to the thresholds in each k-th part of a frame [electrons].
+        spikes: (F, H, W) uint8, zeros.
     """
     frames, rows, columns = spikes.shape
     nodes = start(law, pixels, film, edges[0, 0], rng)

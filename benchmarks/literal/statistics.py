@@ -1,4 +1,4 @@
-"""What two simulations are compared by: numbers of the spikes of one group of pixels, (F, H, W) uint8 -> float.
+"""Statistics of two simulations: numbers of the spikes of one group of pixels, (F, H, W) uint8 -> float.
 
 A group is independent of all others, so the standard error of a number is its spread over groups.
 """
@@ -15,27 +15,29 @@ from scipy import stats
 from spikecam_env.types import Floats, Spikes
 
 LIMIT = 4.2
-"""|z| beyond it is a difference.  Of independent comparisons of what is the same, one in 37 000 is beyond."""
+"""|z| beyond it is a difference.  Of independent comparisons of equals, one in 37 000 is beyond."""
 
 
 @dataclass(frozen=True)
 class Statistic:
-    """name; of: what it is of one group, a number or, of a histogram, several (n,); scale: what an error is relative
-    to, None for the number itself."""
+    """A number of one group of pixels, or a histogram."""
 
     name: str
     of: Callable[[Spikes], Floats | float]
+    """(F, H, W) spikes -> the number, or (n,) of a histogram."""
     scale: float | None = None
+    """Unit of a relative error; None: the number itself."""
 
 
 @dataclass(frozen=True)
 class Comparison:
-    """A statistic of the literal simulation and of an engine; error: relative, by Statistic.scale."""
+    """A statistic of the literal simulation and of an engine."""
 
     literal: float
     engine: float
     z: float
     error: float
+    """Relative error, by `Statistic.scale`."""
 
     @property
     def agrees(self) -> bool:

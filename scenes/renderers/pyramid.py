@@ -5,7 +5,7 @@ A ray steps over a texture by a parallelogram.  It reads between the levels next
     level = log2(max(shortest, longest / 2)) + SHARPER        [texels]; level l is the texture reduced by 2^l
 
 longest: the longer side, shortest: area / longest.  Source: Williams, "Pyramidal parametrics", SIGGRAPH 1983; OpenGL's
-EXT_texture_filter_anisotropic.  Measured on the picture of `spikecam bench renderers`, 2 x 2 rays a pixel against
+EXT_texture_filter_anisotropic.  Measured on the picture of `python -m benchmarks.renderers`, 2 x 2 rays a pixel against
 16 x 16, rms of full scale: 1.00 %; by the area of the footprint alone 1.24 %, by its longest side alone 1.26 %, without
 levels 1.54 %.
 """

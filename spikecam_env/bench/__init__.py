@@ -1,1 +1,1 @@
-"""What `spikecam bench` measures, a file each: speed, as ratios to a baseline of the same run, and errors of light."""
+"""Measurements of `spikecam bench`, a file each: speed, as ratios to a baseline of the same run."""

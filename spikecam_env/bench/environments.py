@@ -2,9 +2,8 @@
 
 spikecam bench env
 
-Other programs slow a machine, and take turns with what is measured.  So what is compared is measured in turn, in short
-rounds; a ratio is the median over rounds of ratios within one round; and the processor's time, of all processes of a
-vector, is given beside the clock's.
+Other programs slow a machine at times.  So vectors are measured in turn, in short rounds, and a ratio is the median
+over rounds of ratios within one round.  The processor's time, of all processes of a vector, stands beside the clock's.
 """
 
 from __future__ import annotations
@@ -40,7 +39,7 @@ KINDS = ("RotatingDisk-v0", "Track-v1", "Collage-v0", "Tumble-v0", "Scene-v0")
 EPISODES, STEPS = 6, 8
 """Episodes of each that are timed, and steps in each, beside a first episode of each."""
 PARTS = ("light, %", "camera, %", "beside both, %")
-"""Of the processor's time of a step."""
+"""Parts of the processor's time of a step."""
 ROUNDS = 7
 WARM_UP = 3
 """Steps before the first round: they compile and fill pipelines."""
@@ -48,18 +47,22 @@ WARM_UP = 3
 
 @dataclass(frozen=True)
 class Contestant:
-    """how: of the row.  step: one step of all environments.  envs: in this process, whose scenes and cameras can be
-    asked alone; empty where there are none.  processes: others that do the work.  close: gives everything back."""
+    """Environments that are stepped in one way."""
 
     how: str
+    """Name of the way."""
     environments: int
+    """Number of environments."""
     step: Callable[[], Any]
+    """One step of all environments."""
     envs: Sequence[SpikeCameraEnv]
+    """Environments in this process, whose scenes and cameras can run alone."""
     close: Callable[[], Any]
     processes: Sequence[int] = ()
+    """Other processes that do the work."""
 
     def seconds_a_step(self, seconds: float) -> tuple[float, float]:
-        """Of one environment: by the clock, and of the processor; measured for so long at least."""
+        """Seconds by the clock and of the processor for a step of one environment, over `seconds` at least."""
         begin, busy, calls = time.perf_counter(), cpu_seconds(self.processes), 0
         while (elapsed := time.perf_counter() - begin) < seconds or calls == 0:
             self.step()
@@ -77,9 +80,10 @@ def bench_environments() -> dict[str, list[dict[str, Any]]]:
 def bench_episodes(
     kinds: tuple[str, ...] = KINDS, episodes: int = EPISODES, steps: int = STEPS
 ) -> list[dict[str, Any]]:
-    """How long episodes take to begin, and steps of 40 frames of 64 x 64 pixels by a camera that does not turn.
+    """Time that episodes take to begin, and steps of 40 frames of 64 x 64 pixels by a camera that does not turn.
 
-    Columns: id; begin ms, of `reset`, and step ms, medians by the clock; frames/s of the steps, x real time.
+    Returns:
+        Rows of id; begin ms, of `reset`, and step ms, medians by the clock; frames/s of the steps, x real time.
     """
     rows = []
     for name in tqdm(kinds, desc="bench", unit="id", leave=False):
@@ -117,13 +121,18 @@ def bench_vectors(
 ) -> list[dict[str, Any]]:
     """Steps of 40 frames of 64 x 64 pixels, all environments together; cameras that do not turn.
 
-    seconds: of each row in a round.
-    Columns: id, observation, environments, how (single, sync, async, native), steps/s (median over rounds), x single
-    (one environment of the same id and observation) and x async (as many environments), medians over rounds of ratios
-    within a round; x real time (1000 steps a second each camera).
-    Of the processor, which other programs take from the clock's time but not from its own: processor ms of an
-    environment's step, all processes together, and x async of it.  Where it goes, %, of environments in this process:
-    the same light painted alone, the same frames exposed alone, and what is left.
+    Args:
+        counts: numbers of environments.
+        cases: ids and observations.
+        seconds: time for each row in a round.
+        rounds: number of rounds.
+
+    Returns:
+        Rows of id, observation, environments and how (single, sync, async, native).  steps/s is a median over rounds.
+        x single (one environment) and x async (as many) are medians over rounds of ratios within a round.  x real time
+        is over 1000 steps a second of each camera.  processor ms is the processor's time of an environment's step, all
+        processes together, with x async of it.  Its parts, %, are of environments in this process: the light alone,
+        the camera alone, the rest.
     """
     jobs = [(name, obs, count) for name, obs in cases for count in counts]
     rows: list[dict[str, Any]] = []
@@ -172,12 +181,12 @@ def _group(
 
 
 def _times(seconds: NDArray[np.float64], other: int, place: int) -> float:
-    """How many times as fast as another contestant one is, of seconds (rounds, contestants)."""
+    """Speed of a contestant over that of another, by seconds (rounds, contestants)."""
     return float(np.median(seconds[:, other] / seconds[:, place]))
 
 
 def shares(one: Contestant, seconds: float, rounds: int) -> dict[str, float]:
-    """Of the processor's time of a step [%]: the scenes', the cameras', and what is left."""
+    """Parts of the processor's time of a step [%]: the scenes', the cameras', and the rest."""
     threads = as_many(None, len(one.envs)) if one.how == "native" else 1
     calls = max(1, round(seconds / one.seconds_a_step(seconds)[0] / one.environments))
     light: list[Keyframes] = []
@@ -190,12 +199,12 @@ def shares(one: Contestant, seconds: float, rounds: int) -> dict[str, float]:
             env.sensor.frame = env.next_block[0]
         step_together([env.sensor for env in one.envs], light, OPTIONS["frames_per_step"], threads=threads)
 
-    found = []
+    parts = []
     for _ in range(rounds):
         alone = [cpu_of(part, calls) for part in (paint, expose)]
         of_step = cpu_of(one.step, calls)
-        found.append([100.0 * part / of_step for part in alone])
-    of_light, of_camera = np.median(found, axis=0).tolist()
+        parts.append([100.0 * part / of_step for part in alone])
+    of_light, of_camera = np.median(parts, axis=0).tolist()
     return dict(zip(PARTS, (of_light, of_camera, 100.0 - of_light - of_camera), strict=True))
 
 
@@ -208,16 +217,16 @@ def cpu_of(call: Callable[[], Any], calls: int) -> float:
 
 
 def cpu_seconds(others: Sequence[int] = ()) -> float:
-    """Of the processor so far: of this process and these others; NaN where others cannot be asked."""
+    """Seconds of the processor so far, of this process and others; NaN where others do not show theirs."""
     return time.process_time() + sum(time.clock_gettime(clock) if clock else np.nan for clock in map(_clock, others))
 
 
 @lru_cache(maxsize=256)
 def _clock(process: int) -> int:
     """POSIX's clock of a process's time on the processor; 0 where there is none."""
-    found = ctypes.c_int(0)
+    clock = ctypes.c_int(0)
     ask = getattr(ctypes.CDLL(None), "clock_getcpuclockid", None) if os.name == "posix" else None
-    return found.value if ask is not None and ask(process, ctypes.byref(found)) == 0 else 0
+    return clock.value if ask is not None and ask(process, ctypes.byref(clock)) == 0 else 0
 
 
 def single(name: str, obs: str) -> Contestant:

@@ -29,9 +29,9 @@ def bench_learners(count: int = ENVIRONMENTS, rollout: int = ROLLOUT, rounds: in
     """Steps of 40 frames of 64 x 64 pixels of Track, all environments together, by the clock.
 
     Args:
-        count: of environments.
+        count: number of environments.
         rollout: steps of each in a round.
-        rounds: in which the vectors are measured in turn.
+        rounds: number of rounds, in which the vectors are measured in turn.
 
     Returns:
         A row for each vector: steps/s of the vector alone, and of PPO with its usual network, which learns from it;
@@ -71,7 +71,7 @@ def bench_learners(count: int = ENVIRONMENTS, rollout: int = ROLLOUT, rounds: in
 
 
 def _vectors() -> dict[str, Callable[[int], Any]]:
-    """What makes so many environments, by the vector's name."""
+    """Functions that make a vector of so many environments, by name."""
     from stable_baselines3.common.env_util import make_vec_env
 
     from spikecam_env.envs.wrappers import SB3Cameras

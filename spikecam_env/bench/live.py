@@ -1,4 +1,4 @@
-"""Live mode: what a frame costs, pictures a second at several speeds of the stream, and what leaving passes out costs.
+"""Live mode: cost of a frame, pictures a second at several speeds of the stream, and the error of skipping passes.
 
 spikecam bench live
 
@@ -60,18 +60,18 @@ def bench_live(seconds: float = SECONDS, seed: int = 0) -> dict[str, list[dict[s
     """Tables by title: a frame's and a picture's cost, streams in real time, errors against the true light."""
     spikes = SpikeSensor("scsim", SHAPE, seed).step(RotatingDisk(SHAPE).radiance(0, RECORDED), RECORDED)
     return {
-        "What it costs": costs(spikes),
+        "Costs": costs(spikes),
         f"A stream of {FRAME_RATE_HZ} frames/s from a file, {seconds:g} s": streams(spikes, seconds),
         f"Error of a picture, PSNR [dB] against the true light, {SMALL[0]} x {SMALL[1]}": errors(seed),
     }
 
 
 def costs(spikes: NDArray[np.uint8]) -> list[dict[str, Any]]:
-    """CPU time of taking a frame in, of reading it, and of a picture by mode; `OnlineDnSS`, for every frame, to compare
-    with.
+    """CPU time of a frame that is pushed or read, of a picture by mode, and of a frame of `OnlineDnSS`.
 
-    Columns: what, CPU time [us] of a frame or picture, MB/s of packed bytes, and the cores that real time would take
-    (30 pictures a second).
+    Returns:
+        Rows of the work, CPU time [us] of a frame or picture, MB/s of packed bytes, and the cores that real time would
+        take (30 pictures a second).
     """
     packed = pack_frames(spikes)
     modes = {mode: LiveDnSS(SHAPE, mode) for mode in MODES}
@@ -106,8 +106,9 @@ def costs(spikes: NDArray[np.uint8]) -> list[dict[str, Any]]:
 def streams(spikes: NDArray[np.uint8], seconds: float) -> list[dict[str, Any]]:
     """A file played over and over at several speeds, denoised as it comes, as `spikecam live` does.
 
-    Columns: what, frames/s taken in, frames lost, pictures/s, latency [ms] from a frame's coming to its picture.  The
-    last row is `OnlineDnSS`, as fast as it goes: every frame is denoised, so every frame is a picture.
+    Returns:
+        Rows of the stream, frames/s taken in, frames lost, pictures/s, latency [ms] from a frame to its picture.  The
+        last row is `OnlineDnSS` at its full speed: it denoises every frame, so every frame is a picture.
     """
     rows: list[dict[str, Any]] = []
     with tempfile.TemporaryDirectory() as folder:
@@ -129,10 +130,11 @@ def streams(spikes: NDArray[np.uint8], seconds: float) -> list[dict[str, Any]]:
 
 
 def errors(seed: int) -> list[dict[str, Any]]:
-    """What leaving passes out costs: pictures GAP frames apart against the true light, once the gain is found.
+    """Error of skipping passes: pictures GAP frames apart against the true light, after the gain has settled.
 
-    Columns: scene, mean interval [frames]; PSNR [dB] of the noisy picture (TFP 41), of live pictures by passes a
-    picture, and of the same frames out of `OnlineDnSS`.
+    Returns:
+        Rows of scene and mean interval [frames]; PSNR [dB] of the noisy picture (TFP 41), of live pictures by passes a
+        picture, and of the same frames out of `OnlineDnSS`.
     """
     return [_errors(name, interval, seed) for name, interval in tqdm(SCENES, desc="errors", unit="scene", leave=False)]
 

@@ -62,12 +62,18 @@ class CalledAsInTraining(nn.Module):
 def bench_loop(
     shape: tuple[int, int] = SHAPE, seconds: float = 8.0, threads: int | None = None, engine: str = "torch"
 ) -> dict[str, Rows]:
-    """Tables by title, one a scene.
+    """Measure the loop in two scenes.
 
-    seconds: for each scene, all denoisers included; three blocks of 64 frames at least.  threads: of torch, default
-    its own; light and camera take NUMBA_NUM_THREADS.  engine: of the denoiser.
-    Columns: stage, frames/s (wall clock) and x real time (40 000 frames a second), processor ms/frame, of the whole, %
-    (processor's time), x plain float32 (of the denoisers and of the whole, processor's time: medians over blocks).
+    Args:
+        shape: rows and columns.
+        seconds: time for each scene, all denoisers included; three blocks of 64 frames at least.
+        threads: threads of torch, default its own; light and camera take NUMBA_NUM_THREADS.
+        engine: engine of the denoiser.
+
+    Returns:
+        A table a scene, by title.  Its rows have stage, frames/s (wall clock) and x real time (40 000 frames a
+        second).  processor ms/frame and of the whole, %, are by the processor's time.  So is x plain float32, of the
+        denoisers and of the whole: medians over blocks.
     """
     with torch_settings(threads):
         scenes: dict[str, Callable[[], Scene]] = {
@@ -124,7 +130,7 @@ def _timed(scene: Scene, seconds: float, engine: str) -> list[Seconds]:
 
 
 def _clocked(block: Seconds, stage: str, work: Callable[..., Any], *arguments: Any) -> Any:
-    """What the work returns; the block learns how long it took."""
+    """Do the work, and note its time in the block; returns the result."""
     wall, processor = time.perf_counter(), time.process_time()
     result = work(*arguments)
     block[stage] = np.array([time.perf_counter() - wall, time.process_time() - processor])
@@ -142,7 +148,7 @@ def _gain(blocks: list[Seconds], stage: str) -> float | None:
 
 
 def _on_a_gpu() -> str:
-    """What there is to say of the GPU."""
+    """The note on GPUs."""
     if not torch.cuda.is_available():
         return "not measured: these rows need a GPU, and this machine has none"
     return "not measured here: `python -m benchmarks.gpu` does it"

@@ -26,9 +26,15 @@ CHUNK = 16
 def bench_online(threads: tuple[int, ...] = (1, 2), seconds: float = 3.0, seed: int = 0) -> list[dict[str, Any]]:
     """Frames a second of `OnlineDnSS` on a noisy stream of the disk, by size, network evaluation stride and threads.
 
-    Columns: mode, engine, size, stride (frames between network evaluations; `best` and `fast` give 16
-    frames an evaluation), threads, frames/s, x paper (same size and threads, stride 1), x real time (40 000 frames a
-    second), latency [frames].
+    Args:
+        threads: numbers of threads.
+        seconds: time for each row.
+        seed: seed of the camera.
+
+    Returns:
+        Rows of mode, engine, size and threads.  stride is frames between network
+        evaluations; `best` and `fast` give 16 frames an evaluation.  Then frames/s, x paper (same size and threads,
+        stride 1), x real time (40 000 frames a second), latency [frames].
     """
     contestants = [("paper", stride) for stride in STRIDES]
     contestants += [(mode, recipe_of(mode).layout.planes) for mode in ("best", "fast")]

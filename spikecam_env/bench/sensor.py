@@ -27,10 +27,12 @@ from spikecam_env.types import Floats
 
 @dataclass(frozen=True)
 class CameraFormat:
-    """shape: (rows, columns).  rate_hz: frames a second."""
+    """Size and speed of a camera."""
 
     shape: tuple[int, int]
+    """Rows and columns."""
     rate_hz: int
+    """Frames a second."""
 
     def __str__(self) -> str:
         return f"{self.shape[0]} x {self.shape[1]}, {self.rate_hz / 1000:g} kHz"
@@ -59,17 +61,23 @@ LIGHTS: tuple[float | str, ...] = (5.0, 20.0, 100.0, SMOOTH)
 def bench_sensor(
     scenes: Iterable[float | str] = LIGHTS, threads: Iterable[int] = (1, 2), seconds: float = 0.6, seed: int = 0
 ) -> list[dict[str, Any]]:
-    """Measure every engine; returns one row a measurement, numpy with exact Poisson first in each scene.
+    """Measure every engine; compiling is not timed.
 
-    scenes: mean intervals [frames] of steady light, and SMOOTH.  seconds: time spent on each measurement.  Compiling is
-    not timed.
-    Columns: camera, scene, engine, threads, frames (in one call), Gpx-steps/s (median of the repeats), from and to
-    (their quartiles), x numpy (same scene), x real time (of that camera).  All scenes are for a Vidar camera; the last
-    of them for one of a megapixel too.
-    Engine "fast" gives one byte a pixel, "fast, packed" one bit.  "bytes written, no more" fills the same frames with a
-    constant: what memory alone allows.  "light new in every frame" has a key at each frame; what follows from 64 of
-    them goes in one call, or one frame at a time, when nothing can be looked ahead (`kernels.ahead`).  One frame at a
-    time, "fast" is what `SpikeSensor.step` does on keys 64 frames apart.
+    Args:
+        scenes: mean intervals [frames] of steady light, and SMOOTH.
+        threads: numbers of threads.
+        seconds: time for each measurement.
+        seed: seed of the camera.
+
+    Returns:
+        A row a measurement, numpy with exact Poisson first in each scene: camera, scene, engine, threads, frames (in
+        one call), Gpx-steps/s (median of the repeats), from and to (their quartiles), x numpy (same scene), x real time
+        (of that camera).  All scenes are for a Vidar camera; the last of them for one of a megapixel too.
+
+        Engine "fast" gives one byte a pixel, "fast, packed" one bit.  "bytes written, no more" fills the same frames
+        with a constant, the limit of the memory.  "light new in every frame" has a key at each frame.  64 such frames
+        go in one call, or one at a time, without looking ahead (`kernels.ahead`).  One frame at a time, "fast" is
+        `SpikeSensor.step` on keys 64 frames apart.
     """
     rows: list[dict[str, Any]] = []
     scenes, threads = list(scenes), tuple(threads)
@@ -114,7 +122,7 @@ def scene_light(scene: float | str, shape: tuple[int, int] = SHAPE) -> Keyframes
 
 
 Contestant = tuple[str, int, int, Sequence[Any], Callable[[Any], object]]
-"""Engine, threads, frames in one call, parts of the light, and what takes one of them."""
+"""Engine, threads, frames in one call, parts of the light, and the function that takes one of them."""
 
 
 def _contestants(camera: CameraFormat, scene: float | str, seed: int, threads: tuple[int, ...]) -> Iterable[Contestant]:
@@ -149,7 +157,7 @@ def _contestants(camera: CameraFormat, scene: float | str, seed: int, threads: t
 
 
 def numpy_step(unit: Unit, charge: Floats, segment: Segment, rng: np.random.Generator) -> NDArray[np.uint8]:
-    """The baseline: what one writes first.  Poisson electrons, compare, subtract; a fixed threshold."""
+    """The baseline, in plain numpy: Poisson electrons, compare, subtract; a fixed threshold."""
     light = ramp(segment, *unit.grains_per_frame)
     electrons_per_grain = unit.electrons / GRAINS
     grains_per_electron = GRAINS / unit.electrons

@@ -1,4 +1,4 @@
-"""Calibration: a camera's noise from grey-level recordings (SNEE), and the preset fitted to real ones."""
+"""Calibration: a camera's noise from grey-level recordings (SNEE)."""
 
 from spikecam_env.calibration.findings import Finding, findings
 from spikecam_env.calibration.flats import write_flats

@@ -20,16 +20,18 @@ from spikecam_env.types import Floats
 
 @dataclass(frozen=True)
 class ChargeScale:
-    """electrons: N a nominal threshold.  reset_noise_mV: sigma of a reset.  prior: which of them was assumed.
-
-    sd: standard errors, 0 for what is prior.  electrons is inf where the noise is below the reset noise assumed.
-    """
+    """Charge of a threshold and noise of a reset."""
 
     electrons: float
+    """N, electrons to a nominal threshold; inf where the noise is below the assumed reset noise."""
     electrons_sd: float
+    """Standard error of `electrons`."""
     reset_noise_mV: float
+    """Standard deviation of a reset."""
     reset_noise_sd_mV: float
+    """Standard error of `reset_noise_mV`, 0 where it is prior."""
     prior: str | None
+    """Name of the field that was assumed."""
 
 
 def charge_at_one_v_d(jitter: Jitter | None, swing_V: float, reset_noise_mV: float) -> ChargeScale | None:
@@ -45,10 +47,19 @@ def charge_at_one_v_d(jitter: Jitter | None, swing_V: float, reset_noise_mV: flo
 def charge_at_two_v_d(
     one: Jitter | None, other: Jitter | None, swing_V: Floats, other_swing_V: Floats
 ) -> ChargeScale | None:
-    """N of the mean threshold and the reset noise, given each pixel's swing (P,) at both settings [V], NaN if unknown.
+    """N of the mean threshold and the reset noise, by two settings.
 
-    Both are scaled pixel by pixel, with the weights that the jitter was pooled with: at 0.6 V a spread of V_S of 50 mV
-    adds 2 % to the mean of kappa^2.  None without spike times, or where the two contradict the law.
+    Both are scaled pixel by pixel, with the weights of the pooled jitter.  At 0.6 V a spread of V_S of 50 mV adds 2 %
+    to the mean of kappa^2.
+
+    Args:
+        one: jitter at the first setting.
+        other: jitter at the second.
+        swing_V: (P,) swings at the first [V], NaN if unknown.
+        other_swing_V: (P,) swings at the second.
+
+    Returns:
+        The scale; None without spike times, or where the two contradict the law.
     """
     if one is None or other is None:
         return None

@@ -1,4 +1,4 @@
-"""What a calibration identified, with 90 % intervals, and what it took as prior or cannot say."""
+"""The identifiability table of a calibration: identified quantities with 90 % intervals, priors, and the others."""
 
 from __future__ import annotations
 
@@ -16,18 +16,21 @@ Status = Literal["identified", "assumed", "not identified"]
 
 @dataclass(frozen=True)
 class Finding:
-    """One line of the identifiability table; half_width: of the 90 % interval, None where there is none.
+    """One line of the identifiability table.
 
-    >>> Finding("N", "identified", 29_600.0, 350.0, "electrons a threshold", "two V_d").text
-    '2.96e+04 ± 3.5e+02'
+    Example:
+        >>> Finding("N", "identified", 29_600.0, 350.0, "electrons a threshold", "two V_d").text
+        '2.96e+04 ± 3.5e+02'
     """
 
     quantity: str
     status: Status
     value: float | None
     half_width: float | None
+    """Half-width of the 90 % interval, None where there is none."""
     unit: str
     basis: str
+    """The data or the assumption behind it."""
 
     @property
     def text(self) -> str:
@@ -40,10 +43,12 @@ class Finding:
 def findings(calibration: Calibration) -> list[Finding]:
     """The table, most direct first.
 
-    >>> from spikecam_env.sensor import SensorModel
-    >>> campaign = write_flats("camera", SensorModel.preset("scsim"), levels=(0.0, 0.2, 0.5), frames=400, shape=(8, 8))
-    >>> [(found.quantity, found.status) for found in findings(calibrate(campaign))][:2]
-    [('alpha/phi, mean', 'identified'), ('alpha/phi, spread', 'identified')]
+    Example:
+        >>> from spikecam_env.sensor import SensorModel
+        >>> levels = (0.0, 0.2, 0.5)
+        >>> campaign = write_flats("camera", SensorModel.preset("scsim"), levels=levels, frames=400, shape=(8, 8))
+        >>> [(finding.quantity, finding.status) for finding in findings(calibrate(campaign))][:2]
+        [('alpha/phi, mean', 'identified'), ('alpha/phi, spread', 'identified')]
     """
     return [*_rates(calibration), *_noise(calibration), *_two_v_d(calibration), *_rest(calibration)]
 

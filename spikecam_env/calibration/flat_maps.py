@@ -3,12 +3,12 @@
     D_light   D at 335 lux, where D = (R - n) / n for n spikes in R frames: empty frames between spikes
     Nd        dark level [lux]:  Nd = 153 D_153 / (D_dark - D_153),  D_dark = 1 / (n_dark / R + 1e-5) - 1
 
-so that rates are n / R = 1 / (D + 1).  D is often taken for the mean interval, rate 1 / D; against it speaks that
-R / (D + 1) is whole for all 100 000 pixels, to 7e-5, which is float32's rounding, and that SpikeNeRF's own code has
-D = 1 / rate - 1.  Nothing that came with the maps says what Nd was made of; the second line was found from its values.
-They are only 5479 different ones, each made of two whole numbers, n_dark and n_153: to 1e-4 in all 100 000 pixels,
-where chance would give it to 0.3 %.  (In 2 of 10 000 another pair is as near.)  In maps where no pair is, the dark
-level follows from D_light as their own correction has it, D_dark = D_light (335 + Nd) / Nd, right to a few per cent.
+so that rates are n / R = 1 / (D + 1).  D is often taken for the mean interval, rate 1 / D.  Two facts contradict that:
+R / (D + 1) is whole for all 100 000 pixels to 7e-5, float32's rounding, and SpikeNeRF's own code has D = 1 / rate - 1.
+The maps come without the law of Nd; the second line follows from its values.  They are only 5479 different ones, each
+made of two whole numbers, n_dark and n_153: to 1e-4 in all 100 000 pixels, where chance would give it to 0.3 %.  In 2
+of 10 000 pixels another pair is as near.  In maps without such a pair, the dark level follows from D_light by their own
+correction, D_dark = D_light (335 + Nd) / Nd, right to a few per cent.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ DIM_LUX = 153.0
 KEYS = frozenset({"D_light", "Nd"})
 
 _NEVER = 1e-5
-"""What the maps' authors add to the dark rate, against division by zero."""
+"""Added to the dark rate by the maps' authors, against division by zero."""
 
 _SEARCH = 0.25
 """How far a dark count may be from that of the maps' correction, relative; two counts more for the darkest."""
@@ -45,21 +45,23 @@ _MOST = 1e9
 
 @dataclass(frozen=True)
 class FlatMaps:
-    """(H, W) rates [spikes/frame] in FRAMES frames: lit at 335 lux, dim at 153 lux, dark; dark current is in all.
-
-    counted: where n_dark and n_153 came out whole.  Elsewhere dark is approximate, and dim NaN.
-    """
+    """(H, W) rates [spikes/frame] in FRAMES frames; dark current is in all."""
 
     lit: Floats
+    """Rates at 335 lux."""
     dim: Floats
+    """Rates at 153 lux, NaN where not `counted`."""
     dark: Floats
+    """Rates in the dark, approximate where not `counted`."""
     counted: NDArray[np.bool_]
+    """Whether n_dark and n_153 are whole."""
 
 
 def read_flat_maps(path: Path) -> FlatMaps:
     """Read D_light and Nd (module's equations) from an npz.
 
-    Errors: InputError for a file that cannot be read, maps that differ in shape, values that no camera can have.
+    Raises:
+        InputError: for a file that cannot be read, maps that differ in shape, values that no camera can have.
     """
     arrays = read_arrays(path, ("D_light", "Nd"))
     between, dark_lux = (numbers(array, name, str(path)).astype(np.float64) for name, array in arrays.items())
@@ -84,7 +86,7 @@ def counted(rate: Floats, seed: int = 0) -> Floats:
 
 
 def spread_counts(rate: Floats, seed: int = 1) -> Floats:
-    """Counted rates spread evenly within a count, so that quantiles of small counts say something."""
+    """Counted rates spread evenly within a count, so that quantiles of small counts are no whole numbers."""
     return rate + (np.random.default_rng(seed).random(rate.shape) - 0.5) / FRAMES
 
 

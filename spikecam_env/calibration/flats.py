@@ -25,15 +25,24 @@ def write_flats(
     engine: str = "auto",
     progress: bool = False,
 ) -> Campaign:
-    """Record flats of one unit into a campaign; a level of 0 is a dark recording.
+    """Record flats of one unit into a campaign.
 
-    levels: radiance of each recording, as its label says.  frames: their lengths, or one for all.
-    second_v_d: repeat all levels at this V_D - V_ref [V], same light.  seed: which unit, and its temporal noise.
+    Args:
+        folder: folder of the campaign.
+        model: the camera's model.
+        levels: radiance of each recording, its label; 0 is a dark recording.
+        frames: lengths of the recordings, or one for all.
+        shape: rows and columns.
+        seed: seed of the unit and of its temporal noise.
+        second_v_d: V_D - V_ref [V] at which all levels are recorded once more, in the same light.
+        engine: as in `SpikeSensor`.
+        progress: show a bar.
 
-    >>> from spikecam_env.sensor import SensorModel
-    >>> campaign = write_flats("camera", SensorModel.preset("scsim"), levels=(0.0, 0.2), frames=100, shape=(4, 8))
-    >>> [recording.name for recording in campaign.recordings]
-    ['dark-00', 'flat-01']
+    Example:
+        >>> from spikecam_env.sensor import SensorModel
+        >>> campaign = write_flats("camera", SensorModel.preset("scsim"), levels=(0.0, 0.2), frames=100, shape=(4, 8))
+        >>> [recording.name for recording in campaign.recordings]
+        ['dark-00', 'flat-01']
     """
     levels = [float(level) for level in levels]
     lengths = [frames] * len(levels) if isinstance(frames, int) else list(frames)

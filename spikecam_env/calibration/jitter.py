@@ -3,13 +3,14 @@
 A_k = E[(t_(n+2k) - 2 t_(n+k) + t_n)^2] for spikes at frames t_n = floor(c_n), crossings c_n of mean interval T:
 
     A_k = 2 k s^2 T^2 + k^2 b T^2 + 1/2 - 8 r_k + 2 r_2k
+
     r_k = sum over m >= 1 of cos(2 pi m k T) exp(-2 pi^2 m^2 k s^2 T^2) / (2 pi^2 m^2)
 
 s^2 = 1/N + kappa^2: white noise, drawn anew for each spike.  b: slow noise (1/f).  1/2 - 8 r_k + 2 r_2k: reading spikes
 in whole frames; r_k is the covariance of the fractions lost at spikes k apart, B_2(frac kT) / 2 without noise, and
 dies once k spikes jitter by a frame.  Slopes in k of a pixel whose kT is near a whole number are wrong without r_k.
 
-Derivation: docs/calibration.md.  Without r_k: DESIGN section 2.
+Derivation: docs/calibration.md.
 """
 
 from __future__ import annotations
@@ -32,21 +33,22 @@ _LEAST = 1e-10
 
 @dataclass(frozen=True)
 class Jitter:
-    """white: s^2 = 1/N + kappa^2, pooled; slow: b, of k^2 (see the module).  sd: standard errors, over pixels.
-
-    slow_fitted: whether b was kept; it is dropped (0) where it is not four standard errors above nothing.
-    weight: (P,) share of each pixel in s^2, which is the mean of their own with these weights.
-    steps, by_step, by_step_sd: (K,) what each k alone gives for s^2 + k b / 2; flat without slow noise.
-    """
+    """Temporal noise of a camera; standard errors are over pixels."""
 
     white: float
+    """s^2 = 1/N + kappa^2, pooled."""
     white_sd: float
     slow: float
+    """b, the coefficient of k^2; 0 where it is less than four standard errors."""
     slow_sd: float
     slow_fitted: bool
+    """Whether b was kept."""
     weight: Floats
+    """(P,) share of each pixel in s^2, a weighted mean over pixels."""
     steps: NDArray[np.int64]
+    """(K,) the k with data."""
     by_step: Floats
+    """(K,) s^2 + k b / 2 by each k alone; constant without slow noise."""
     by_step_sd: Floats
 
 
@@ -57,11 +59,12 @@ def second_difference(k: ArrayLike, interval: ArrayLike, white: float, slow: flo
 
 
 class _Read(NamedTuple):
-    """Of intervals of k spikes read in whole frames, whatever their noise: cos(2 pi k T), and 2 pi^2 k T^2, by which
-    s^2 makes the first harmonic die."""
+    """Intervals of k spikes read in whole frames."""
 
     cosine: Floats
+    """cos(2 pi k T)."""
     rate: Floats
+    """2 pi^2 k T^2, the decay of the first harmonic with s^2."""
 
     @classmethod
     def of(cls, k: NDArray[np.int64], interval: Floats) -> _Read:
@@ -69,7 +72,7 @@ class _Read(NamedTuple):
 
 
 def _quantisation(read: _Read, white: float) -> tuple[Floats, Floats]:
-    """1/2 - 8 r_k + 2 r_2k, what reading in whole frames adds to A_k, and its derivative in s^2."""
+    """1/2 - 8 r_k + 2 r_2k, the part of A_k by reading in whole frames, and its derivative in s^2."""
     out = np.empty((2, *read.rate.shape))
     _sum_harmonics(read.cosine.ravel(), read.rate.ravel(), white, _WEIGHTS, *out.reshape(2, -1))
     return out[0], out[1]
@@ -98,10 +101,16 @@ def _sum_harmonics(
 
 
 def fit_jitter(steps: NDArray[np.int64], square: Floats, terms: Floats, rate: Floats) -> Jitter | None:
-    """Fit s^2 and b to sums of squares (R, P, K) with terms (R, P, K), given rates (R, P) [spikes/frame].
+    """Fit s^2 and b by iterated weighted moments; errors are from the scatter over pixels.
 
-    R recordings, P pixels; entries without terms or rate carry no weight.  Weighted moments, iterated; errors from
-    the scatter over pixels.  Returns None where fewer than 100 terms are there.
+    Args:
+        steps: (K,) the k.
+        square: (R, P, K) sums of squares of R recordings and P pixels.
+        terms: (R, P, K) number of squares; 0 carries no weight.
+        rate: (R, P) rates [spikes/frame]; NaN carries no weight.
+
+    Returns:
+        The noise; None below 100 terms.
     """
     usable = np.isfinite(rate) & (rate > 0)
     terms = np.where(usable[..., None], terms, 0.0)
@@ -121,7 +130,7 @@ def fit_jitter(steps: NDArray[np.int64], square: Floats, terms: Floats, rate: Fl
 def _by_step(
     steps: NDArray[np.int64], square: Floats, terms: Floats, interval: Floats, fit: _Fit
 ) -> tuple[Floats, Floats]:
-    """What each k alone gives for s^2 + k b / 2, and its standard error, (K,)."""
+    """(K,) s^2 + k b / 2 by each k alone, and its standard error."""
     fraction = _quantisation(_Read.of(steps, interval), fit.white)[0]
     shape = 2 * steps * interval**2
     weight = shape / np.maximum((fit.white + steps * fit.slow / 2) * shape + fraction, 0.05) ** 2
@@ -143,8 +152,8 @@ class _Fit(NamedTuple):
 def _fit(steps: NDArray[np.int64], square: Floats, terms: Floats, interval: Floats, *, slow: bool) -> _Fit:
     """Gauss-Newton on weighted means.
 
-    Weights follow the noise, by which steps may turn back by half of the one before, for twenty of them.  From two that
-    go to and fro, all that would follow are taken at once (Aitken).
+    Weights follow the noise, so a step may turn back by half of the one before, twenty times over.  After two steps to
+    and fro, the sum of all that would follow is taken at once (Aitken).
     """
     t2, read = interval**2, _Read.of(steps, interval)
     white, b, last = 3e-5, 0.0, np.inf

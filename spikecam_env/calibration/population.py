@@ -20,7 +20,7 @@ FLAGS = {
     "misfit": 8,
 }
 """Bits of a pixel's flag.  unidentified: fewer than two levels below saturation.  dead: responds to light by less than
-a tenth of the median pixel.  hot: dark current beyond what fits the rest (`hot_limit`).  misfit: no straight line."""
+a tenth of the median pixel.  hot: dark current above `hot_limit`.  misfit: no straight line."""
 
 _DEAD_SHARE = 0.1
 _HOT_SIGMAS = 5.0
@@ -30,7 +30,7 @@ _MISFIT_P = 1e-7
 def pixel_flags(
     gain: Floats, dark: Floats, chi2: Floats, freedom: NDArray[np.int64], excess: float
 ) -> NDArray[np.uint8]:
-    """uint8 bits of FLAGS, of the arrays' shape; chi2 is reduced, excess: pooled chi2."""
+    """uint8 bits of FLAGS, of the arrays' shape; chi2 is reduced; excess: reduced chi2 pooled over pixels."""
     flags = np.zeros(gain.shape, dtype=np.uint8)
     unknown = ~np.isfinite(gain)
     flags[unknown] |= FLAGS["unidentified"]
@@ -52,11 +52,14 @@ def hot_limit(dark: Floats) -> float:
 
 @dataclass(frozen=True)
 class DarkLaw:
-    """Dark level over pixels.  law: 'normal' (first, second: mean, sd) or 'log-normal' (median, sigma of ln)."""
+    """Distribution of the dark level over pixels."""
 
     law: str
+    """'normal' or 'log-normal'."""
     first: float
+    """Mean of a normal law, median of a log-normal one."""
     second: float
+    """Standard deviation, of the logarithm for a log-normal law."""
 
 
 def dark_law(dark: Floats) -> DarkLaw:
@@ -73,7 +76,7 @@ def dark_law(dark: Floats) -> DarkLaw:
 
 
 def spread(values: Floats, sd: Floats) -> float:
-    """Standard deviation over mean, less what the measurement's own errors add."""
+    """Standard deviation over mean, less the measurement's own errors `sd`."""
     return float(np.sqrt(max(values.var() - np.mean(sd**2), 0.0)) / values.mean())
 
 
@@ -91,10 +94,23 @@ def fitted_model(
     swing_V: Floats | None,
     swing_sd_V: Floats | None = None,
 ) -> SensorModel:
-    """A model with the spreads of these maps; gain relative to its mean, dark [thresholds/frame] as current.
+    """A model with the spreads of these maps (H, W).
 
-    Without swing_V all multiplicative spread goes into the conversion gain: rates at one V_d cannot tell alpha, C_S
-    and V_S apart, and together they act as one.
+    Without `swing_V` all multiplicative spread goes into the conversion gain.  Rates at one V_d do not distinguish
+    alpha, C_S and V_S, which act as one.
+
+    Args:
+        name: name of the model.
+        circuit: its circuit.
+        frame_rate_hz: its frame rate.
+        gain: rate over light; the model has it relative to its mean.
+        gain_sd: standard errors of `gain`.
+        dark: dark level [thresholds/frame].
+        flags: bits of `FLAGS`.
+        electrons: N, electrons to a threshold; inf for none.
+        reset_noise_mV: noise of a reset.
+        swing_V: V_d + V_S [V], if known.
+        swing_sd_V: standard errors of `swing_V`.
     """
     good = flags == 0
     per_volt = np.ones_like(gain) if swing_V is None else swing_V / swing_V[good].mean()

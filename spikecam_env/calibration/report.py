@@ -32,15 +32,15 @@ def report(calibration: Calibration, findings: Sequence[Finding]) -> str:
             + f". {int(np.sum(c.flags == 0))} of {c.flags.size} pixels regular. spikecam-env {__version__}.",
         ),
         *(element("p", w, class_="warn") for w in c.warnings),
-        element("h2", "What these data identify"),
+        element("h2", "Identified quantities"),
         _findings_table(findings),
     ]
     figures: list[tuple[str, Callable[[Figure, Setting, Calibration], None], tuple[float, float], str]] = [
         ("Response", _response, (10, 4), "Left: rate over light of 40 pixels and the median pixel's line. "
-         "Right: what each label is off by, were the line exact: medians over pixels, bars from 10 to 90 % of them."),
+         "Right: error of each label, if the line is exact: medians over pixels, bars from 10 to 90 % of them."),
         ("Residuals", _residuals, (10, 3.6), "Left: residuals of all pixels and levels in standard deviations of the "
          "law, with a normal curve. Right: reduced chi-square of each pixel."),
-        ("Temporal noise", _noise, (10, 4), "A_k less what reading in whole frames adds, over 2 k T², pooled over "
+        ("Temporal noise", _noise, (10, 4), "A_k less its part by reading in whole frames, over 2 k T², pooled over "
          "pixels and levels. Level: noise drawn anew for each spike. Rising: slow noise."),
         ("Maps", _maps, (10, 4), "alpha/phi and I_dark/phi of every pixel, and which pixels are odd."),
         ("Distributions", _histograms, (10, 3.6), "Regular pixels; the dark level on a logarithmic axis with normal "

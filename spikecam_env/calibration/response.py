@@ -22,29 +22,29 @@ from spikecam_env.calibration.spike_times import SpikeTimes
 from spikecam_env.types import Floats
 
 SATURATION = 0.97
-"""Rate above which a recording of a pixel is left out: jitter makes some intervals shorter than a frame: lost."""
+"""Rate above which a recording of a pixel is left out: jitter makes some intervals shorter than a frame, and lost."""
 
 _ITERATIONS = 4
 
 
 @dataclass(frozen=True)
 class Rates:
-    """Measured rates of R recordings of P pixels; (R, P) unless said.
-
-    rate [spikes/frame]; NaN where a recording says nothing of a pixel.  intervals: n - 1 of each rate.
-    ends: variance of the span [frames^2] from reading its two ends in whole frames.
-    limit: standard deviation of a rate that is only a limit (0 or 1 spikes), else NaN.
-    frames: (R,) lengths.  counted: (R,) bool, rates that come from counts instead of spike times.
-    saturated: bool, fires in (nearly) every frame.
-    """
+    """Measured rates of R recordings of P pixels; (R, P) unless a shape is given."""
 
     rate: Floats
+    """Rates [spikes/frame]; NaN where unknown."""
     intervals: Floats
+    """Number of intervals of each rate, n - 1."""
     ends: Floats
+    """Variance of the span [frames^2] by reading its two ends in whole frames."""
     limit: Floats
+    """Standard deviation of a rate that is only a limit (0 or 1 spikes), else NaN."""
     frames: Floats
+    """(R,) lengths."""
     counted: NDArray[np.bool_]
+    """(R,) whether rates come from counts instead of spike times."""
     saturated: NDArray[np.bool_]
+    """Whether a pixel fires in (nearly) every frame."""
 
     def variance(self, expected: Floats, white: float) -> Floats:
         """(R, P) variance of the rates, were `expected` the true ones; white: s^2."""
@@ -58,11 +58,10 @@ class Rates:
 
 
 def rates_from_times(times: list[SpikeTimes]) -> Rates:
-    """Rates from spike times; pixels with 0 or 1 spikes get the mean and spread that so few spikes leave possible.
+    """Rates from spike times; of 0 or 1 spikes the mean and spread of the possible rates.
 
-    The phase is uniform, so in R frames 0 spikes have probability 1 - rate R, and one at t has density `rate`, as long
-    as the interval is longer than what is seen to be empty, b = max(t, R - t): means 1/3R and 2/3b, variances 1/18R^2
-    and 1/18b^2.
+    The phase is uniform, so in R frames 0 spikes have probability 1 - rate R.  One at t has density `rate`, if the
+    interval is longer than the empty part b = max(t, R - t).  Means are 1/3R and 2/3b, variances 1/18R^2 and 1/18b^2.
     """
     frames = np.array([t.frames for t in times], dtype=np.float64)
     count = np.stack([t.count for t in times])
@@ -123,32 +122,36 @@ def together(parts: list[Rates]) -> Rates:
 
 @dataclass(frozen=True)
 class Lines:
-    """Fitted lines, (P,): gain, dark and their variances and covariance; NaN where two levels are not there.
-
-    chi2, freedom: weighted squared residuals and their degrees of freedom.  used: recordings in the line.
-    residual: (R, P) distance from the line over its own standard deviation, which is less than the rate's, since the
-    line was drawn through it; NaN where not used or exact.
-    """
+    """Fitted lines of P pixels; (P,) unless a shape is given; NaN below two levels."""
 
     gain: Floats
     dark: Floats
     var_gain: Floats
     var_dark: Floats
     covariance: Floats
+    """Covariance of gain and dark."""
     chi2: Floats
+    """Weighted squared residuals."""
     freedom: NDArray[np.int64]
+    """Degrees of freedom of `chi2`."""
     used: NDArray[np.int64]
+    """Number of recordings in the line."""
     residual: Floats
+    """(R, P) distance from the line in its own standard deviations; NaN where not used or exact.  These are smaller
+    than the rate's, since the line was fitted to it."""
 
 
 def fit_lines(light: Floats, rates: Rates, white: float, use: NDArray[np.bool_] | None = None) -> Lines:
     """Weighted least squares for every pixel; weights from fitted, not measured, rates.
 
-    light: (R, P) radiance.  white: s^2.  use: (R,) recordings to fit; the rest only get residuals.
+    Args:
+        light: (R, P) radiance.
+        white: s^2.
+        use: (R,) whether a recording is fitted; the others only get residuals.
     """
-    told = np.isfinite(rates.rate) & ~rates.saturated
-    fitted = told if use is None else told & use[:, None]
-    measured = np.where(told, rates.rate, 0.0)
+    known = np.isfinite(rates.rate) & ~rates.saturated
+    fitted = known if use is None else known & use[:, None]
+    measured = np.where(known, rates.rate, 0.0)
     expected = np.maximum(measured, 1e-6)
     for _ in range(_ITERATIONS):
         variance = rates.variance(expected, white)
@@ -167,8 +170,8 @@ def fit_lines(light: Floats, rates: Rates, white: float, use: NDArray[np.bool_] 
     chi2 = np.where(fitted & good, distance**2 / variance, 0.0).sum(0)
     of_line = (sll - 2 * light * sl + light**2 * sw) / divisor
     left = variance + np.where(fitted, -of_line, of_line)
-    known = told & (left > 0.01 * variance)
-    residual = np.where(known, distance / np.sqrt(np.where(known, left, 1.0)), np.nan)
+    inexact = known & (left > 0.01 * variance)
+    residual = np.where(inexact, distance / np.sqrt(np.where(inexact, left, 1.0)), np.nan)
     freedom = np.where(good, fitted.sum(0) - 2, 0)
     return Lines(gain, dark, sw / divisor, sll / divisor, -sl / divisor, chi2, freedom, fitted.sum(0), residual)
 
@@ -176,10 +179,20 @@ def fit_lines(light: Floats, rates: Rates, white: float, use: NDArray[np.bool_] 
 def best_possible(
     gain: Floats, dark: Floats, light: Floats, frames: Floats, white: float | Floats
 ) -> tuple[Floats, Floats]:
-    """(P,) smallest standard deviations of gain and dark that any estimator can have (Cramer-Rao; docs/calibration.md).
+    """Smallest standard deviations of gain and dark of any estimator (Cramer-Rao; docs/calibration.md).
 
-    From crossings seen exactly, levels below one spike a frame; light: (R, P), frames: (R,), white: s^2 or (P,) of it.
-    Below one spike expected there is no interval; 0 or 1 spikes leave a variance of 1/18 frames^2 (`rates_from_times`).
+    By exact times of the crossings, at levels below one spike a frame.  Below one expected spike there is no interval:
+    0 or 1 spikes leave a variance of 1/18 frames^2 (`rates_from_times`).
+
+    Args:
+        gain: (P,) thresholds/frame at radiance 1.
+        dark: (P,) thresholds/frame.
+        light: (R, P) radiance.
+        frames: (R,) lengths.
+        white: s^2, of all pixels or (P,).
+
+    Returns:
+        ((P,) of gain, (P,) of dark).
     """
     rate = gain * light + dark
     length = np.broadcast_to(frames[:, None], rate.shape)

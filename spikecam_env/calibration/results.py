@@ -37,7 +37,7 @@ def save_calibration(calibration: Calibration, folder: str | Path) -> list[Path]
         >>> [path.name for path in save_calibration(calibrate(campaign), "calibrated")]
         ['model.toml', 'maps.h5', 'report.html']
     """
-    from spikecam_env.calibration.report import report  # draws by matplotlib, which who denoises does not need
+    from spikecam_env.calibration.report import report  # imports matplotlib, for drawing alone
 
     names = ("model.toml", "maps.h5", "report.html")
     with whole_folder(folder, replace=True) as beside:
@@ -54,10 +54,12 @@ def calibrated_model(calibration: Calibration) -> SensorModel:
     Its radiance is that of the labels times `radiance_scale` of the maps (mean alpha/phi), so that 1.0 keeps meaning
     one spike a frame of the nominal pixel.
 
-    >>> from spikecam_env.sensor import SensorModel
-    >>> campaign = write_flats("camera", SensorModel.preset("scsim"), levels=(0.0, 0.2, 0.5), frames=400, shape=(8, 8))
-    >>> calibrated_model(calibrate(campaign)).name
-    'calibrated from camera'
+    Example:
+        >>> from spikecam_env.sensor import SensorModel
+        >>> levels = (0.0, 0.2, 0.5)
+        >>> campaign = write_flats("camera", SensorModel.preset("scsim"), levels=levels, frames=400, shape=(8, 8))
+        >>> calibrated_model(calibrate(campaign)).name
+        'calibrated from camera'
     """
     c = calibration
     electrons, reset_noise_mV = c.circuit.threshold_electrons, c.circuit.thermal_noise_mV

@@ -1,4 +1,4 @@
-"""SNEE: what a campaign of flats says about a camera, and what it cannot say.
+"""SNEE: a camera's response and noise by a campaign of flats.
 
 Rates at one V_d fix two numbers a pixel, alpha/phi and I_dark/phi; their temporal noise fixes one more for the camera,
 1/N + kappa^2.  With a second V_d the same charge is divided by another threshold, so V_S, N and kappa come apart.
@@ -38,7 +38,7 @@ from spikecam_env.sensor.unit import MOST_KAPPA, SWING_V
 from spikecam_env.types import Floats
 
 SAME_V_D_V = 1e-6
-"""Distance up to which two V_d are one [V]: far below what a supply sets, far above the rounding of labels."""
+"""Distance up to which two V_d are one [V]: far below a supply's steps, far above the rounding of labels."""
 
 Z90 = 1.6448536
 """Half-width of a 90 % interval [standard deviations]."""
@@ -46,70 +46,82 @@ Z90 = 1.6448536
 
 @dataclass(frozen=True)
 class Level:
-    """One recording's part.  radiance, rate: medians over pixels.  saturated: share of pixels left out for it.
-
-    residual: median over pixels of measured over fitted rate, less one: the label's error, if the line is right.
-    """
+    """One recording of a setting."""
 
     name: str
     use: str
     frames: int
     radiance: float
+    """Median over pixels."""
     rate: float
+    """Median over pixels [spikes/frame]."""
     saturated: float
+    """Share of pixels that are left out since they saturate."""
     residual: float
+    """Median over pixels of measured over fitted rate, less one: the label's error, if the line is right."""
 
 
 @dataclass(frozen=True)
 class Setting:
-    """All of one V_d.  Maps are (H, W): gain = alpha/phi [thresholds/frame at radiance 1], dark = I_dark/phi
-    [thresholds/frame], their standard deviations, reduced chi-square, and recordings used.
-
-    light, rate, residual: (R, H*W) radiance, measured rate, and its distance from the line in standard deviations.
-    excess: pooled reduced chi-square; where above one, standard deviations were widened by its root.
-    """
+    """All recordings at one V_d; maps are (H, W)."""
 
     v_d: float | None
     levels: tuple[Level, ...]
     gain: Floats
+    """alpha/phi [thresholds/frame at radiance 1]."""
     gain_sd: Floats
     dark: Floats
+    """I_dark/phi [thresholds/frame]."""
     dark_sd: Floats
     covariance: Floats
+    """Covariance of gain and dark."""
     chi2: Floats
+    """Reduced chi-square."""
     used: NDArray[np.int64]
+    """Number of recordings in the line."""
     excess: float
+    """Pooled reduced chi-square; above 1.2, standard deviations are widened by its root."""
     flags: NDArray[np.uint8]
+    """Bits of `population.FLAGS`."""
     jitter: Jitter | None
     light: Floats
+    """(R, H*W) radiance."""
     rate: Floats
+    """(R, H*W) measured rates."""
     residual: Floats
+    """(R, H*W) distances from the line in standard deviations."""
 
 
 @dataclass(frozen=True)
 class Calibration:
-    """What a campaign fixed.  settings: by V_d, the main one first.  flags: (H, W) uint8, bits of `population.FLAGS`.
+    """A camera as a campaign of flats shows it.
 
-    charge: N and kappa, with what they rest on.  swing_V: (H, W) V_d + V_S [V], with a second V_d, else None.
-    warnings: what the data could not say, or contradict.
-
-    >>> from spikecam_env.sensor import SensorModel
-    >>> campaign = write_flats("camera", SensorModel.preset("scsim"), levels=(0.0, 0.2, 0.5), frames=400, shape=(8, 8))
-    >>> calibration = calibrate(campaign)
-    >>> calibration.shape, len(calibration.settings), calibration.flags.shape
-    ((8, 8), 1, (8, 8))
+    Example:
+        >>> from spikecam_env.sensor import SensorModel
+        >>> levels = (0.0, 0.2, 0.5)
+        >>> campaign = write_flats("camera", SensorModel.preset("scsim"), levels=levels, frames=400, shape=(8, 8))
+        >>> calibration = calibrate(campaign)
+        >>> calibration.shape, len(calibration.settings), calibration.flags.shape
+        ((8, 8), 1, (8, 8))
     """
 
     campaign: str
+    """Name of the campaign's folder."""
     shape: tuple[int, int]
     frame_rate_hz: float
     settings: tuple[Setting, ...]
+    """By V_d, the main one first."""
     flags: NDArray[np.uint8]
+    """(H, W) bits of `population.FLAGS`."""
     charge: ChargeScale | None
+    """N and kappa, with the prior that they use."""
     swing_V: Floats | None
+    """(H, W) V_d + V_S [V], with a second V_d, else None."""
     swing_sd_V: Floats | None
     circuit: Circuit
+    """The prior circuit."""
     warnings: tuple[str, ...]
+    """Quantities that the data do not identify, and data that contradict each other."""
 
     @property
     def main(self) -> Setting:
@@ -126,16 +138,23 @@ def calibrate(
 ) -> Calibration:
     """Estimate a camera from static recordings of known light.
 
-    circuit: prior for what rates cannot say (capacitance, reference voltage); default the published one.
-    reset_noise_mV: prior for the reset noise, used where there is one V_d; default thermal, sqrt(kT/C).
-    Raises InputError where nothing can be identified: one level only, all dark, all saturated, no regular pixel, labels
-    that contradict the rates.
+    Args:
+        campaign: the campaign, or its folder.
+        circuit: prior for capacitance and reference voltage, which rates do not show; default: the published one.
+        reset_noise_mV: prior for the reset noise, used at a single V_d; default: thermal, sqrt(kT/C).
+        progress: show a bar.
 
-    >>> from spikecam_env.sensor import SensorModel
-    >>> campaign = write_flats("camera", SensorModel.preset("scsim"), levels=(0.0, 0.2, 0.5), frames=400, shape=(8, 8))
-    >>> calibration = calibrate(campaign)
-    >>> round(float(calibration.main.gain.mean()), 1)  # spikes a frame at radiance 1
-    1.0
+    Raises:
+        InputError: where nothing can be identified: one level only, all dark, all saturated, no regular pixel, labels
+            that contradict the rates.
+
+    Example:
+        >>> from spikecam_env.sensor import SensorModel
+        >>> levels = (0.0, 0.2, 0.5)
+        >>> campaign = write_flats("camera", SensorModel.preset("scsim"), levels=levels, frames=400, shape=(8, 8))
+        >>> calibration = calibrate(campaign)
+        >>> round(float(calibration.main.gain.mean()), 1)  # spikes a frame at radiance 1
+        1.0
     """
     campaign = campaign if isinstance(campaign, Campaign) else read_campaign(campaign)
     prior = circuit or Circuit()
@@ -185,7 +204,7 @@ def calibrate(
 
 
 def _are_swings(swing_V: Floats) -> bool:
-    """Whether the mean of the pixels that are known, of which there are some, is a swing that a circuit can have."""
+    """Whether the mean of the known pixels is a swing that a circuit can have."""
     return bool(SWING_V[0] <= np.nanmean(swing_V) <= SWING_V[1])
 
 
@@ -227,7 +246,7 @@ def _by_v_d(campaign: Campaign, warnings: list[str]) -> dict[float | None, list[
 
 
 def _alike(known: Iterable[float | None], v_d: float | None) -> float | None:
-    """A V_d of those that are known, where it is this one but for SAME_V_D_V; else this one."""
+    """A known V_d within SAME_V_D_V of this one, else this one."""
     near = (one for one in known if one is not None and v_d is not None and abs(one - v_d) <= SAME_V_D_V)
     return next(near, v_d)
 
@@ -239,6 +258,7 @@ def _fit_setting(
     warnings: list[str],
     progress: bool,
 ) -> Setting:
+    """Fit the lines and the noise of all recordings at one V_d; appends to `warnings`."""
     pixels = campaign.shape[0] * campaign.shape[1]
     use = np.array([r.use == "fit" for r, _ in recordings])
     light = np.stack([x.reshape(-1) for _, x in recordings])
@@ -258,29 +278,29 @@ def _fit_setting(
     jitter = _pooled_jitter(spikes, np.ones(pixels, dtype=bool))
     if jitter is None:
         warnings.append("no spike times: temporal noise is not identified; intervals assume s^2 of shot noise alone")
-    white = jitter.white if jitter else 1.0 / Circuit().threshold_electrons
-    lines = fit_lines(light, rates, white, use)
-    if not np.any(np.isfinite(lines.gain)):
-        raise InputError(
-            f"no pixel has two levels{_at(v_d)} below saturation, {SATURATION:g} spikes a frame; "
-            "add flats of less light"
-        )
+    lines = fit_lines(light, rates, jitter.white if jitter else 1.0 / Circuit().threshold_electrons, use)
+    _check_lines(lines, v_d)
     excess = _pooled_excess(lines)
-    if lines.freedom.max() == 0:
-        warnings.append("two levels only: that rate is linear in light is assumed, not tested")
-    if excess > 1.5:
-        warnings.append(
-            f"residuals are {np.sqrt(excess):.1f} times what jitter explains: labels, linearity or steadiness of the "
-            "light are off by that much; intervals are widened"
-        )
-    widen = np.sqrt(max(excess, 1.0)) if excess > 1.2 else 1.0
+    warnings += _warnings_of_lines(lines, excess)
     reduced = lines.chi2 / np.maximum(lines.freedom, 1)
     flags = pixel_flags(lines.gain, lines.dark, reduced, lines.freedom, excess)
     if jitter is not None and np.any(flags):
         jitter = _pooled_jitter(spikes, flags == 0) or jitter
     if jitter is not None and jitter.slow_fitted:
         warnings.append(f"A_k rises with k^2 too: slow noise, b = {jitter.slow:.2g} +- {jitter.slow_sd:.1g}")
-    shaped: dict[str, Any] = {
+    levels = _levels(recordings, light, rates, lines, flags == 0)
+    maps = _maps(lines, reduced, flags, excess, campaign.shape)
+    return Setting(
+        v_d, levels, **maps, excess=excess, jitter=jitter, light=light, rate=rates.rate, residual=lines.residual
+    )
+
+
+def _maps(
+    lines: Lines, reduced: Floats, flags: NDArray[np.uint8], excess: float, shape: tuple[int, int]
+) -> dict[str, Any]:
+    """The (H, W) fields of a `Setting`; errors are widened where the pooled chi-square is clearly above 1."""
+    widen = np.sqrt(max(excess, 1.0)) if excess > 1.2 else 1.0
+    fields = {
         "gain": lines.gain,
         "gain_sd": widen * np.sqrt(lines.var_gain),
         "dark": lines.dark,
@@ -290,11 +310,28 @@ def _fit_setting(
         "flags": flags,
         "used": lines.used,
     }
-    maps = {name: values.reshape(campaign.shape) for name, values in shaped.items()}
-    levels = _levels(recordings, light, rates, lines, flags == 0)
-    return Setting(
-        v_d, levels, **maps, excess=excess, jitter=jitter, light=light, rate=rates.rate, residual=lines.residual
-    )
+    return {name: values.reshape(shape) for name, values in fields.items()}
+
+
+def _warnings_of_lines(lines: Lines, excess: float) -> list[str]:
+    """Warnings on lines that were not tested, or that do not fit; excess: pooled reduced chi-square."""
+    warnings = []
+    if lines.freedom.max() == 0:
+        warnings.append("two levels only: that rate is linear in light is assumed, not tested")
+    if excess > 1.5:
+        warnings.append(
+            f"residuals are {np.sqrt(excess):.1f} times as large as by jitter: labels, linearity or steadiness of the "
+            "light are off by that much; intervals are widened"
+        )
+    return warnings
+
+
+def _check_lines(lines: Lines, v_d: float | None) -> None:
+    if not np.any(np.isfinite(lines.gain)):
+        raise InputError(
+            f"no pixel has two levels{_at(v_d)} below saturation, {SATURATION:g} spikes a frame; "
+            "add flats of less light"
+        )
 
 
 def _check_levels(light: Floats, v_d: float | None) -> None:
@@ -315,7 +352,7 @@ def _at(v_d: float | None) -> str:
 def _check_order(
     recordings: list[tuple[CampaignRecording, Floats]], light: Floats, rates: Rates, use: NDArray[np.bool_]
 ) -> None:
-    """More light, more spikes: raises InputError where medians over pixels say otherwise by more than 1 %."""
+    """Refuse labels that contradict the rates: medians over pixels that fall by more than 1 % with more light."""
     label, rate = np.median(light, axis=1), np.nanmedian(rates.rate, axis=1)
     lit = rate[use & (label > 0)]
     if lit.size and lit.max() <= 2 / rates.frames.max():

@@ -1,4 +1,4 @@
-"""What calibration needs of a recording, in one pass over its bits: spike times, not counts.
+"""Spike times of a recording, in one pass over its bits, as calibration needs them in place of counts.
 
 A steady pixel's count is known to a spike, its first and last spike to a frame: with n spikes the rate is
 (n - 1) / (last - first), T times better than n / frames.
@@ -16,6 +16,7 @@ from numpy.typing import ArrayLike, NDArray
 from spikecam_env.compiled import njit
 from spikecam_env.streams.bits import as_words, by_pixel, times_of
 from spikecam_env.threads import as_many
+from spikecam_env.types import Floats
 
 STEPS = (1, 2, 4, 8, 16, 32, 64, 128)
 """k of A_k by default: short ones see dim light's jitter, long ones bright light's and slow noise."""
@@ -23,18 +24,22 @@ STEPS = (1, 2, 4, 8, 16, 32, 64, 128)
 
 @dataclass(frozen=True)
 class SpikeTimes:
-    """Per pixel, row-major: count, first, last (P,) int64 (-1 without spikes); frames: length of the recording.
-
-    square: (P, K) float64 sums of (t_(n+2k) - 2 t_(n+k) + t_n)^2 and terms: (P, K) how many, at k = steps.
-    """
+    """Spike times of P pixels, row-major."""
 
     frames: int
+    """Length of the recording."""
     count: NDArray[np.int64]
+    """(P,) number of spikes."""
     first: NDArray[np.int64]
+    """(P,) frame of the first spike, -1 without spikes."""
     last: NDArray[np.int64]
+    """(P,) frame of the last spike, -1 without spikes."""
     steps: NDArray[np.int64]
+    """(K,) the k of A_k."""
     square: NDArray[np.float64]
+    """(P, K) sums of (t_(n+2k) - 2 t_(n+k) + t_n)^2."""
     terms: NDArray[np.int64]
+    """(P, K) number of terms of the sums."""
 
     @property
     def rate(self) -> NDArray[np.float64]:
@@ -46,9 +51,13 @@ class SpikeTimes:
 def spike_times(
     packed: NDArray[np.uint8], pixels: int, steps: ArrayLike = STEPS, *, threads: int | None = None
 ) -> SpikeTimes:
-    """Summarise (frames, ceil(pixels/8)) uint8 bits, as `streams.pack_frames` gives them.
+    """Spike times of a packed recording.
 
-    threads: default NUMBA_NUM_THREADS.
+    Args:
+        packed: (frames, ceil(pixels/8)) uint8 bits, as `streams.pack_frames` gives them.
+        pixels: number of pixels.
+        steps: (K,) the k of A_k.
+        threads: number of threads, default NUMBA_NUM_THREADS.
     """
     ks = np.asarray(steps, dtype=np.int64)
     words = as_words(np.asarray(packed))
@@ -63,6 +72,36 @@ def spike_times(
             job.result()
     count, first, last = ends[:pixels].T
     return SpikeTimes(len(words), count, first, last, ks, square[:pixels], terms[:pixels])
+
+
+def ideal_second_difference(k: NDArray[np.int64], interval: Floats) -> Floats:
+    """A_k of a noise-free pixel of interval T, phase uniform: 2 min(x, 1 - x), x the fractional part of kT."""
+    x = np.mod(k * interval, 1.0)
+    return 2.0 * np.minimum(x, 1.0 - x)
+
+
+def plausible_rates(times: SpikeTimes, white: float, rng: np.random.Generator) -> Floats:
+    """Draw rates that agree with the first and the last spike of each pixel, under jitter of variance `white`.
+
+    Measured rates crowd at simple fractions: a pixel of interval 5.004 shows one of 5 for a hundred spikes.  A camera
+    simulated at exactly such rates has second differences that no real one has.  Drawn rates lie as the true ones do.
+
+    Args:
+        times: spikes of each pixel.
+        white: s^2, the variance of an interval over its square.
+        rng: source of the draws.
+
+    Returns:
+        (P,) rates [spikes/frame].
+    """
+    n = np.maximum(times.count - 1, 1)
+    interval = np.maximum(times.last - times.first, 1) / n
+    after = times.frames - 1 - times.last
+    begin = times.first + rng.random(n.size) * np.clip(interval - times.first, 0.0, 1.0)
+    end = times.frames - after - rng.random(n.size) * np.clip(interval - after, 0.0, 1.0)
+    walk = np.sqrt(n * white) * interval * rng.standard_normal(n.size)
+    least = n  # a pixel fires once a frame at most, however wide the jitter
+    return np.asarray(n / np.maximum(end - begin + walk, least))
 
 
 @njit(cache=True, nogil=True, boundscheck=False)

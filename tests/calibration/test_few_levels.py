@@ -1,4 +1,4 @@
-"""Campaigns that say little: a result without numpy's warnings, or one line that says what cannot be identified."""
+"""Campaigns that say little: a result without numpy's warnings, or one line that names the unidentified quantity."""
 
 from __future__ import annotations
 

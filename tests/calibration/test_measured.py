@@ -7,13 +7,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from benchmarks.check_measured import flat_quantiles, simulated_wall
-from benchmarks.clock_locking import clock_locking
-from benchmarks.paper_figure import grey_patches
+from benchmarks.check_measured import clock_locking, flat_quantiles, simulated_wall
 from spikecam_env.calibration.flat_maps import FRAMES, FlatMaps, read_flat_maps
-from spikecam_env.calibration.real import MAPS, read_response_and_dark, read_wall, wall_statistics
-from spikecam_env.calibration.two_levels import split_shading, two_levels
-from spikecam_env.calibration.wall_noise import simulate_wall
 from spikecam_env.errors import InputError
 from spikecam_env.sensor import SensorModel, SpikeSensor
 from tools.fit_measured import (
@@ -22,6 +17,9 @@ from tools.fit_measured import (
     hot_population,
     log_normal_through_quantiles,
 )
+from tools.real.recordings import MAPS, read_response_and_dark, read_wall, wall_statistics
+from tools.real.two_levels import split_shading, two_levels
+from tools.real.wall_noise import simulate_wall
 
 REAL = Path(__file__).resolve().parents[2].parent / "shared" / "data" / "real"
 needs_real = pytest.mark.skipif(
@@ -119,7 +117,7 @@ def test_two_levels_tell_gain_from_offset() -> None:
 
 @needs_real
 def test_the_flat_maps_are_counts_of_4000_frames() -> None:
-    """What `flat_maps` says: whole counts at 335 lux, at 153 lux and in the dark, in every pixel."""
+    """As `flat_maps` states: whole counts at 335 lux, at 153 lux and in the dark, in every pixel."""
     maps = read_flat_maps(REAL / MAPS)
     off = np.abs(FRAMES * maps.lit - np.round(FRAMES * maps.lit))
     print(f"335 lux: {off.max():.1e} from whole counts; pairs of dark and 153 lux found: {maps.counted.mean():.2%}")
@@ -129,11 +127,11 @@ def test_the_flat_maps_are_counts_of_4000_frames() -> None:
 
 @needs_real
 def test_pixels_differ_by_gain_and_an_offset_and_not_by_a_factor_common_with_the_dark() -> None:
-    found = two_levels(read_flat_maps(REAL / MAPS))
-    print(found)
-    assert abs(found.covariance_off) < 0.02
-    assert found.common > 2 * found.lit
-    assert found.gain_dark < 0.5 * found.lit_dark
+    spreads = two_levels(read_flat_maps(REAL / MAPS))
+    print(spreads)
+    assert abs(spreads.covariance_off) < 0.02
+    assert spreads.common > 2 * spreads.lit
+    assert spreads.gain_dark < 0.5 * spreads.lit_dark
 
 
 def test_a_camera_without_a_clock_has_as_many_late_spikes_as_early_ones() -> None:
@@ -186,10 +184,3 @@ def test_the_presets_constants_are_what_its_command_fits() -> None:
     assert parameters["conversion_gain_spread"]["sigma"] == pytest.approx(pixel_spread, rel=0.01)
     assert parameters["dark_current_tail"]["sigma"] == pytest.approx(sigma, rel=0.01)
     assert parameters["hot_pixels"]["fraction"] == pytest.approx(hot_population(dark, median, sigma)[0], rel=0.01)
-
-
-@needs_real
-def test_the_papers_figure_has_five_levels(wall) -> None:
-    levels = [float(p.mean()) for p in grey_patches(wall)]
-    assert len(levels) == 5
-    assert np.all(np.diff(levels) > 0)

@@ -15,12 +15,12 @@ import numpy as np
 import pytest
 
 import spikecam_env.envs  # noqa: F401
+from benchmarks.renderers import objects
 from scenes.renderers import contexts, shared
 from scenes.renderers.choose import make as make_renderer
 from scenes.renderers.embree import Embree
 from scenes.renderers.own_process import ProcessRenderer
 from scenes.renderers.protocol import Lighting, PictureWindow, Pinhole
-from spikecam_env.bench.renderers import objects
 from spikecam_env.errors import InputError, NotReadyError
 from tests.envs.vectors import MANY
 

@@ -4,9 +4,9 @@ import cv2
 import numpy as np
 import pytest
 
+from benchmarks.exact_disk import supersampled
 from scenes import Gaze, RotatingDisk
 from scenes.disk import disk_texture
-from spikecam_env.bench.exact_disk import supersampled
 from spikecam_env.errors import InputError
 
 BACKGROUND = 0.2

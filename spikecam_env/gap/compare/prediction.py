@@ -20,7 +20,7 @@ twins do not make it smaller."""
 PAIR_NOISE = {"rates": 0.15, "noise": 0.2, "rows": 0.3, "intervals": 0.5, "neighbours": 0.5, "drift": 0.6,
               "spectrum": 0.7, "timing": 1.0, "step": 1.2, "moving": 1.2}  # fmt: skip
 """Noise of a pair of twins of the same draws, with and without an effect, over a campaign's noise, by group
-(`python -m benchmarks.paired_twins`, the noisiest effect); 1 for the others."""
+(the noisiest effect, by benchmarks/paired_twins.py of version 0.1.0); 1 for the others."""
 
 
 @dataclass(frozen=True)

@@ -1,8 +1,8 @@
 """Fitting one candidate: simulate the campaign with it, scale and shape it until its statistics are the measured ones.
 
-Every twin is compared with the null's of the same draws, so that what is left of their difference is the effect.
-Statistics move in proportion to the strength (or its square), so each twin says by how much to scale the next; its
-other parameters are of `shapes`.  The unit is refitted along the way, so that the candidate cannot borrow from it.
+Every twin is compared with the null's of the same draws, so their difference is the effect alone.  Statistics move in
+proportion to the strength (or its square), so each twin says by how much to scale the next.  `shapes` fits the other
+parameters.  The unit is refitted along the way, so that the candidate cannot borrow from it.
 """
 
 from __future__ import annotations
@@ -44,22 +44,25 @@ LEAST_FACTOR = 1e-3
 
 @dataclass(frozen=True, eq=False)
 class Fit:
-    """A candidate at its best fit.  parameters, sd: by name.  prediction: of its model; base: its unit.
-
-    rho: (S,) residuals, in noise.  misfit: `distance.residual_and_misfit`.
-    """
+    """A candidate at its best fit."""
 
     name: str
     parameters: dict[str, float]
     sd: dict[str, float]
+    """Standard deviations, by parameter."""
     prediction: Prediction
+    """The prediction of `model`."""
     base: BaseFit
+    """The unit under `model`."""
     rho: Floats
+    """(S,) residuals, in noise."""
     misfit: float
+    """See `distance.residual_and_misfit`."""
     model: SensorModel
+    """The model of the problem with the effect."""
 
     def added_to(self, model: SensorModel) -> list[str]:
-        """Effects that it adds to a model, by name: its own, then those that are fitted with it."""
+        """Names of the effects that it adds to a model: its own, then those that are fitted with it."""
         has = {self.name, *(e.name for e in model.effects)}
         return [self.name, *(e.name for e in self.model.effects if e.name not in has)]
 
@@ -67,10 +70,13 @@ class Fit:
 def fit(
     problem: Problem, name: str, start: Mapping[str, float], expected: Floats | None = None, white: float = 1.0
 ) -> Fit:
-    """Best fit of one candidate's strength (of a pattern, all its parameters) added to the model.
+    """Fit one candidate's strength, or all parameters of a pattern, beside the model.
 
-    start: parameters near the best.  expected: (S,) change of the statistics to expect there, to leave out recordings
-    that it does not concern.  white: s^2 of the unit there, over the refit's.
+    Args:
+        problem: the campaign and the model.
+        start: parameters near the best.
+        expected: (S,) change of the statistics at `start`; recordings without a change are not simulated.
+        white: s^2 of the unit at `start`, over the refit's.
     """
     if candidate(name).is_pattern:
         return _fit_pattern(problem, name, start)
@@ -79,71 +85,138 @@ def fit(
     return _fit_twins(problem, name, dict(start), expected, white)
 
 
+@dataclass(frozen=True, eq=False)
+class _Trial:
+    """An effect at a strength, to be simulated."""
+
+    parameters: dict[str, float]
+    base: BaseFit
+    """The unit under it."""
+    only: list[int]
+    """Recordings to simulate, by index."""
+
+
+@dataclass(frozen=True, eq=False)
+class _Rescaling:
+    """The way from a simulated strength to a better one."""
+
+    strength: float
+    """The strength that was simulated."""
+    predicted: Prediction
+    scale: float
+    """Factor of the effect's change that suits the measurement best."""
+    sd: float
+    """Standard deviation of `scale`."""
+    factor: float
+    """Factor of the strength."""
+    slope: Floats | None
+    """(S,) change of the statistics for one more of the strength's logarithm; None where two twins do not give it."""
+    is_weak: bool = False
+    """Whether the effect is too weak for another simulation to say more."""
+    is_near: bool = True
+    """Whether the strength is right to a third."""
+    is_useless: bool = False
+    """Whether the effect leaves as much misfit as the model without it."""
+
+
 def _fit_twins(problem: Problem, name: str, parameters: dict[str, float], expected: Floats | None, white: float) -> Fit:
-    """Twins at the start, made stronger until they show, once more where the unit settles far off, scaled until the
-    strength is right to a third and the unit has settled; the last step is a scaling of what was simulated, without
-    another twin."""
-    what, null, seen = candidate(name), problem.null, problem.seen
-    strength, power = what.strength, what.power
+    """Simulate, raise the strength until it shows, then rescale until it changes by less than a third.
+
+    The unit is refitted under every trial.  A trial is repeated once where the unit settles far from its start.
+    The last step scales the last prediction, without another twin.
+    """
+    effect, null = candidate(name), problem.null
+    strength, power = effect.strength, effect.power
     expected = np.full(len(null.keys), np.inf) if expected is None else expected
-    parameters, times = amplified(name, bounded(name, parameters), effect_size(null, seen, expected))
-    start = constrained_refit(problem.model, problem.case.base)
-    bare = constrained_refit(with_effect(problem.model, name, parameters), start)
-    base = replace(bare, white=white**times * bare.white)
+    parameters, times = amplified(name, bounded(name, parameters), effect_size(null, problem.seen, expected))
+    bare = constrained_refit(
+        with_effect(problem.model, name, parameters), constrained_refit(problem.model, problem.case.base)
+    )
+    first = replace(bare, white=white**times * bare.white)
     least = problem.misfit() - COMPARED
-    only = problem.affected([name], expected * times)
-    last: tuple[float, Prediction] | None = None
-    slope: Floats | None = None
-    settled_once = False
+    trial = _Trial(parameters, first, problem.affected([name], expected * times))
+    way: _Rescaling | None = None
+    repeated = False
     for turn in range(MOST_TRIES):
-        at_last = turn == MOST_TRIES - 1
-        tried = with_effect(problem.model, name, parameters)
-        predicted = problem.predict(tried, base, twins_of(name), only)
-        size = effect_size(null, seen, predicted.mean - null.mean)
-        stronger = parameters if at_last else until_visible(name, parameters, size)
-        if stronger != parameters:
-            times = abs(stronger[strength] / parameters[strength]) ** power
-            base = extrapolated_unit(bare, base, times, MOST_EXTRAPOLATED)
-            parameters, only = stronger, problem.affected([name])
+        is_last = turn == MOST_TRIES - 1
+        model = with_effect(problem.model, name, trial.parameters)
+        predicted = problem.predict(model, trial.base, twins_of(name), trial.only)
+        size = effect_size(null, problem.seen, predicted.mean - null.mean)
+        stronger = trial.parameters if is_last else until_visible(name, trial.parameters, size)
+        if stronger != trial.parameters:
+            times = abs(stronger[strength] / trial.parameters[strength]) ** power
+            base = extrapolated_unit(bare, trial.base, times, MOST_EXTRAPOLATED)
+            trial = _Trial(stronger, base, problem.affected([name]))
             continue
-        assumed, base = base, problem.settled_unit(tried, base, predicted)
-        if not settled_once and not at_last and not has_converged(assumed, base):
-            settled_once = True
+        assumed, trial = trial.base, replace(trial, base=problem.settled_unit(model, trial.base, predicted))
+        if not repeated and not is_last and not has_converged(assumed, trial.base):
+            repeated = True
             continue
-        scale, sd = scale_to(null, seen, predicted)
-        if problem.misfit(with_change_scaled(null, predicted, scale)) > least:
-            factor, near = LEAST_FACTOR, True
+        way = _rescaling(problem, name, trial, predicted, least, way)
+        if way.is_useless or is_last or (way.is_near and turn):
             break
-        now = parameters[strength], predicted
-        slope = slope_between(problem, last, now) if power == 2.0 else None
-        factor, last = factor_to(problem, name, predicted, scale, slope), now
-        weak = abs(scale) * size < VISIBLE or (
-            what.is_linear and 1 / MOST_EXTRAPOLATED < scale < 1 and scale * size < TARGET_SIZE
-        )
-        near = weak or ROUND_OFF[0] < factor < ROUND_OFF[1]
-        if at_last or (near and turn):
-            break
-        if weak:
-            continue
-        parameters = bounded(name, {**parameters, strength: parameters[strength] * factor})
-        base = extrapolated_unit(bare, base, factor**power, MOST_EXTRAPOLATED)
-        only = problem.affected([name], (predicted.mean - null.mean) * factor**power)
-    final = bounded(name, {**parameters, strength: parameters[strength] * factor}) if near else parameters
-    moved = (final[strength] / parameters[strength]) ** power if parameters[strength] else 1.0
-    if near and slope is not None:
-        predicted = replace(predicted, mean=predicted.mean + slope * np.log(moved) / power)
+        if not way.is_weak:
+            change = (predicted.mean - null.mean) * way.factor**power
+            trial = _Trial(
+                bounded(name, {**trial.parameters, strength: trial.parameters[strength] * way.factor}),
+                extrapolated_unit(bare, trial.base, way.factor**power, MOST_EXTRAPOLATED),
+                problem.affected([name], change),
+            )
+    assert way is not None
+    return _rescaled_fit(problem, name, trial, bare, way)
+
+
+def _rescaling(
+    problem: Problem, name: str, trial: _Trial, predicted: Prediction, least: float, before: _Rescaling | None
+) -> _Rescaling:
+    """The way from a trial to a better strength.
+
+    Args:
+        predicted: its prediction.
+        least: misfit above which the effect is useless.
+        before: the way to the trial, which gives the slope with it.
+    """
+    effect, null = candidate(name), problem.null
+    strength = trial.parameters[effect.strength]
+    scale, sd = scale_to(null, problem.seen, predicted)
+    slope = None if before is None else before.slope
+    if problem.misfit(with_change_scaled(null, predicted, scale)) > least:
+        return _Rescaling(strength, predicted, scale, sd, LEAST_FACTOR, slope, is_useless=True)
+    last = None if before is None else (before.strength, before.predicted)
+    slope = slope_between(problem, last, (strength, predicted)) if effect.power == 2.0 else None
+    factor = factor_to(problem, name, predicted, scale, slope)
+    size = effect_size(null, problem.seen, predicted.mean - null.mean)
+    is_weak = abs(scale) * size < VISIBLE or (
+        effect.is_linear and 1 / MOST_EXTRAPOLATED < scale < 1 and scale * size < TARGET_SIZE
+    )
+    is_near = is_weak or ROUND_OFF[0] < factor < ROUND_OFF[1]
+    return _Rescaling(strength, predicted, scale, sd, factor, slope, is_weak, is_near)
+
+
+def _rescaled_fit(problem: Problem, name: str, trial: _Trial, bare: BaseFit, way: _Rescaling) -> Fit:
+    """The fit at the end of the way, by scaling the last prediction; at the trial itself where that is far."""
+    effect, most = candidate(name), MOST_EXTRAPOLATED
+    now = trial.parameters[effect.strength]
+    final = bounded(name, {**trial.parameters, effect.strength: now * way.factor}) if way.is_near else trial.parameters
+    times = (final[effect.strength] / now) ** effect.power if now else 1.0
+    if way.is_near and way.slope is not None:
+        mean = way.predicted.mean + way.slope * np.log(times) / effect.power
+        predicted = replace(way.predicted, mean=mean)
     else:
-        predicted = with_change_scaled(null, predicted, moved)
-    rho, left = problem.residual_and_misfit(predicted)
-    sds = {strength: abs(final[strength]) * (sd / max(abs(scale), 1e-9) / power)}
-    there = with_effect(problem.model, name, final)
-    unit = extrapolated_unit(bare, base, moved, MOST_EXTRAPOLATED)
-    return Fit(name, final, sds, predicted, unit, rho, left, there)
+        predicted = with_change_scaled(problem.null, way.predicted, times)
+    rho, misfit = problem.residual_and_misfit(predicted)
+    sd = {effect.strength: abs(final[effect.strength]) * (way.sd / max(abs(way.scale), 1e-9) / effect.power)}
+    model = with_effect(problem.model, name, final)
+    return Fit(name, final, sd, predicted, extrapolated_unit(bare, trial.base, times, most), rho, misfit, model)
 
 
 def until_visible(name: str, parameters: dict[str, float], size: float) -> dict[str, float]:
-    """The parameters at a strength that shows by twice `VISIBLE` noises, or where its bounds end; as they are where it
-    shows.  size: noises that it shows by."""
+    """Raise a strength until it shows by twice `VISIBLE` noises, or to the end of its bounds.
+
+    Args:
+        parameters: its parameters, which are returned where the effect shows.
+        size: noises by which it shows.
+    """
     if size >= VISIBLE:
         return parameters
     strength = candidate(name).strength
@@ -152,8 +225,10 @@ def until_visible(name: str, parameters: dict[str, float], size: float) -> dict[
 
 
 def factor_to(problem: Problem, name: str, predicted: Prediction, scale: float, slope: Floats | None) -> float:
-    """By how much to multiply a strength: along its slope where there is one, else by what scales its change best; a
-    tenth where that is negative and the strength cannot be."""
+    """Factor of a strength: along its slope where there is one, else by the best scale of its change.
+
+    A tenth where the scale is negative and the strength cannot be.
+    """
     if slope is not None:
         step = step_of(problem.null, problem.seen, predicted, slope[:, None])[0]
         return float(np.exp(np.clip(step[0], -1.0, 1.0)))
@@ -166,8 +241,10 @@ def factor_to(problem: Problem, name: str, predicted: Prediction, scale: float, 
 def slope_between(
     problem: Problem, one: tuple[float, Prediction] | None, other: tuple[float, Prediction]
 ) -> Floats | None:
-    """(S,) change of the statistics for one more of a strength's logarithm, by twins at two of them; None where these
-    are not two.  What goes with the square of a strength saturates where other noise is, or is a logarithm of both."""
+    """(S,) change of the statistics for one more of a strength's logarithm, by twins at two strengths; None at one.
+
+    A change with the square of a strength saturates beside other noise, or is the logarithm of a sum.
+    """
     if one is None or not one[0] * other[0] > 0 or abs(step := float(np.log(other[0] / one[0]))) < SMALL_STEP:
         return None
     null = problem.null
@@ -179,14 +256,14 @@ def slope_between(
 def _fit_random_course(problem: Problem, name: str, parameters: dict[str, float]) -> Fit:
     """The maximum-likelihood strength of an effect that shows by the scatter of its twins.
 
-    Statistics of one recording are of one course in time: its strength is known no better than from one number each.
+    Statistics of one recording are of one course in time, so a recording says no more of the strength than one number.
     """
     strength, power = candidate(name).strength, candidate(name).power
     only = problem.affected([name])
     for _ in range(2):
-        there = with_effect(problem.model, name, bounded(name, parameters))
-        base = constrained_refit(there, problem.case.base)
-        predicted = problem.predict(there, base, OF_RANDOM_COURSE, only)
+        model = with_effect(problem.model, name, bounded(name, parameters))
+        base = constrained_refit(model, problem.case.base)
+        predicted = problem.predict(model, base, OF_RANDOM_COURSE, only)
         factor, sd = likeliest(problem.null, problem.seen, predicted)
         parameters = bounded(name, {**parameters, strength: parameters[strength] * factor ** (1 / power)})
         if 1 / LARGEST_FACTOR < factor < LARGEST_FACTOR:
@@ -199,18 +276,17 @@ def _fit_random_course(problem: Problem, name: str, parameters: dict[str, float]
 
 def _fit_pattern(problem: Problem, name: str, start: Mapping[str, float]) -> Fit:
     """Coarse to fine search over the strength (and one more parameter), drawing units."""
-    what = candidate(name)
     parameters = bounded(name, start)
     best: Fit | None = None
     for factors in ((0.03, 0.1, 0.3, 1.0, 3.0), (0.55, 0.75, 1.35, 1.8), (0.8, 0.9, 1.1, 1.25), (0.95, 1.05)):
-        for key in what.fitted:
+        for key in candidate(name).fitted:
             centre = best.parameters if best else parameters
             for factor in factors:
                 tried = bounded(name, {**centre, key: centre[key] * factor})
-                there = with_effect(problem.model, name, tried)
-                predicted = problem.with_pattern(there, problem.null.prediction)
+                model = with_effect(problem.model, name, tried)
+                predicted = problem.with_pattern(model, problem.null.prediction)
                 rho, left = problem.residual_and_misfit(predicted)
-                now = Fit(name, tried, {}, predicted, constrained_refit(there, problem.case.base), rho, left, there)
+                now = Fit(name, tried, {}, predicted, constrained_refit(model, problem.case.base), rho, left, model)
                 best = now if best is None or now.misfit < best.misfit else best
     assert best is not None
     return best

@@ -20,52 +20,55 @@ from spikecam_env.gap.unit.refit import BaseFit, constrained_refit
 from spikecam_env.sensor import SensorModel
 
 
-def confirmed(problem: Problem, found: Fit, count: int | None = None) -> Fit:
+def confirmed(problem: Problem, fitted: Fit, count: int | None = None) -> Fit:
     """The fit simulated with more draws, on the recordings held out as well.
 
-    count: of twins, by default as many as confirm a candidate; more where its effects need more."""
-    count = problem.settings.twins.to_confirm if count is None else count
+    Args:
+        count: number of twins, more where its effects need more; default: as many as confirm a candidate.
+    """
+    twins = problem.settings.twins
+    count = twins.to_confirm if count is None else count
     case, model, null = problem.case, problem.model, problem.null
-    added = [e.name for e in found.model.effects if e not in model.effects]
+    added = [e.name for e in fitted.model.effects if e not in model.effects]
     effects = Candidates(tuple(added))
     predicted = null.prediction
     if not (added and effects.all_pattern and not set(added) & set(LINES)):
-        only = problem.affected(added or [found.name], found.prediction.mean - null.mean)
+        only = problem.affected(added or [fitted.name], fitted.prediction.mean - null.mean)
         needed = (OF_RANDOM_COURSE if c.random_course else twins_of(c.name) for c in effects.each)
         count = max(count, *needed, 1)
-        there = with_held_out(case, only)
-        stronger, times = found, 1.0
-        severe = found.base.white < IDENTIFIABLE * case.base.white
+        recordings = with_held_out(case, only)
+        stronger, times = fitted, 1.0
+        severe = fitted.base.white < IDENTIFIABLE * case.base.white
         if len(added) == 1 and not severe and not candidate(added[0]).is_pattern:
-            stronger, times = amplified_fit(problem, found, added[0])
-        predicted = problem.predict(stronger.model, constrained_refit(stronger.model, stronger.base), count, there)
+            stronger, times = amplified_fit(problem, fitted, added[0])
+        predicted = problem.predict(stronger.model, constrained_refit(stronger.model, stronger.base), count, recordings)
         predicted = attenuated(null, predicted, times) if times > 1.0 else predicted
         if severe:
-            bare = problem.predict(model, constrained_refit(model, found.base), 1, there)
+            bare = problem.predict(model, constrained_refit(model, fitted.base), 1, recordings)
             predicted = replace(predicted, own=predicted.mean - bare.mean)
     if effects.any_pattern:
-        predicted = problem.with_pattern(found.model, predicted)
-    return with_prediction(problem, found, predicted)
+        predicted = problem.with_pattern(fitted.model, predicted)
+    return with_prediction(problem, fitted, predicted)
 
 
-def with_prediction(problem: Problem, found: Fit, predicted: Prediction) -> Fit:
+def with_prediction(problem: Problem, fitted: Fit, predicted: Prediction) -> Fit:
     """The fit by another prediction of it."""
     rho, left = problem.residual_and_misfit(predicted)
-    return replace(found, prediction=predicted, rho=rho, misfit=left)
+    return replace(fitted, prediction=predicted, rho=rho, misfit=left)
 
 
-def amplified_fit(problem: Problem, found: Fit, name: str) -> tuple[Fit, float]:
-    """(fit, times as strong) with the effect that it adds to the model, and its unit, as `amplified`."""
-    [effect] = [e for e in found.model.effects if e.name == name]
-    size = effect_size(problem.null, problem.seen, found.prediction.mean - problem.null.mean)
+def amplified_fit(problem: Problem, fitted: Fit, name: str) -> tuple[Fit, float]:
+    """(fit, factor): its effect made stronger (`strength.amplified`), and its unit extrapolated."""
+    [effect] = [e for e in fitted.model.effects if e.name == name]
+    size = effect_size(problem.null, problem.seen, fitted.prediction.mean - problem.null.mean)
     bare = constrained_refit(problem.model, problem.case.base)
     parameters, times = amplified(name, effect.parameters(), size)
-    base = extrapolated_unit(bare, found.base, times, MOST_EXTRAPOLATED)
-    return replace(found, model=with_effect(found.model, name, parameters), base=base), times
+    base = extrapolated_unit(bare, fitted.base, times, MOST_EXTRAPOLATED)
+    return replace(fitted, model=with_effect(fitted.model, name, parameters), base=base), times
 
 
 def attenuated(null: Null, stronger: Prediction, times: float) -> Prediction:
-    """A prediction of an effect simulated `times` as strong, and its draws, brought down to its strength."""
+    """Scale the prediction of an effect that was simulated `times` as strong down to its strength, with its draws."""
     without = {d.number: d for d in null.draws}
     draws = tuple(
         replace(
@@ -79,7 +82,7 @@ def attenuated(null: Null, stronger: Prediction, times: float) -> Prediction:
 
 
 def with_dark_levels_open(problem: Problem, model: SensorModel, base: BaseFit, predicted: Prediction) -> Prediction:
-    """A prediction with the additional error of unknown dark levels, those of a fresh unit of the model.
+    """Add the error of unknown dark levels, those of a fresh unit of the model, to a prediction.
 
     Slow pixels lock to a severe noise, and a refit then does not show how they differ.
     """
@@ -90,14 +93,14 @@ def with_dark_levels_open(problem: Problem, model: SensorModel, base: BaseFit, p
     return replace(predicted, error=np.hypot(predicted.error, change))
 
 
-def resettled(problem: Problem, found: Fit, model: SensorModel) -> Fit:
+def resettled(problem: Problem, fitted: Fit, model: SensorModel) -> Fit:
     """The fit with another model, and its unit settled under it."""
-    base = constrained_refit(model, found.base)
-    return replace(found, model=model, base=problem.settled_unit(model, base, problem.predict(model, base, 1)))
+    base = constrained_refit(model, fitted.base)
+    return replace(fitted, model=model, base=problem.settled_unit(model, base, problem.predict(model, base, 1)))
 
 
-def no_more_certain(problem: Problem, found: Fit, known: Prediction) -> Fit:
+def no_more_certain(problem: Problem, fitted: Fit, known: Prediction) -> Fit:
     """The fit with errors and scatter no smaller than those of a prediction of the same effects."""
-    here = found.prediction
+    here = fitted.prediction
     spread, error = np.maximum(here.spread, known.spread), np.maximum(here.error, known.error)
-    return with_prediction(problem, found, replace(here, spread=spread, error=error))
+    return with_prediction(problem, fitted, replace(here, spread=spread, error=error))

@@ -22,7 +22,7 @@ PHASE_UNIT = 0.1
 
 
 _MOST_LOGARITHMS = 300.0
-"""Beyond every range, and below what overflows."""
+"""Beyond every range, and below overflow."""
 
 
 def moved_value(name: str, key: str, value: float, step: float) -> float:
@@ -41,11 +41,15 @@ def error_of(name: str, key: str, value: float, sd: float) -> float:
 
 
 def interval_of(name: str, key: str, value: float, sd: float, *, by_steps: bool = False) -> tuple[float, float] | None:
-    """Where a parameter is with 90 %, low and high, in its own unit: of a normal error of its coordinate.
+    """90 % interval of a parameter, by a normal error of its coordinate, within the parameter's range.
 
-    It ends where the parameter's range does.  Of a phase it may go through the end of the period: low is above high
-    then.  None where no error is known.
-    sd: as of `error_of`.  by_steps: whether it was fitted as it is, and not by its logarithm; so is what is 0.
+    Args:
+        sd: its standard deviation, as of `error_of`.
+        by_steps: whether it was fitted as it is, and not by its logarithm; a value of 0 always was.
+
+    Returns:
+        (low, high) in the parameter's unit; None where no error is known.  Low is above high where the interval of a
+        phase contains the end of the period.
     """
     if not sd > 0 or not math.isfinite(sd):
         return None

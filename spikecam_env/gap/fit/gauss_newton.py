@@ -1,7 +1,7 @@
 """Gauss-Newton over the parameters of effects (`coordinates.py`), on twins of the same draws as the null's.
 
-Derivatives cost a twin a parameter: they are taken once, and then corrected by what each step turns out to change
-(Broyden), unless it was a long one.
+Derivatives cost a twin a parameter.  They are taken once, and then corrected by the change of each step (Broyden), but
+of a long one.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ from spikecam_env.sensor import SensorModel
 from spikecam_env.types import Floats
 
 PROBES = 2
-"""Times that a model is probed: under the unit there was, and under the one that it then shows."""
+"""Times that a model is probed: under the last unit, and under the unit that settles."""
 
 STOP = 1.0
 """Least misfit that another step has to promise.  Small, since two parameters that compensate each other may both be
@@ -57,7 +57,7 @@ STRENGTH_STEPS = (0.25, 1.0)
 """Steps of a strength's logarithm to take a derivative by, at least and at most."""
 
 Probe = Callable[[SensorModel, BaseFit], Prediction]
-"""What a model and a unit give."""
+"""Predicts the statistics of a model and a unit."""
 
 Free = Sequence[tuple[str, str]]
 """Parameters by effect and name."""
@@ -65,27 +65,34 @@ Free = Sequence[tuple[str, str]]
 
 @dataclass(frozen=True)
 class Descent:
-    """Where it ended.  prediction: of the twins there, the last step added in proportion.  columns: (S, n) derivatives;
-    noise: (S, n) theirs.  covariance: (n, n) of the logarithms.
-    """
+    """The end of a descent."""
 
     model: SensorModel
     base: BaseFit
     prediction: Prediction
+    """Prediction of the last twins, the last step added in proportion."""
     columns: Floats
+    """(S, n) derivatives by the n parameters' logarithms."""
     noise: Floats
+    """(S, n) standard deviations of `columns`."""
     covariance: Floats
+    """(n, n) covariance of the logarithms."""
 
 
 def descend(
     problem: Problem, probe: Probe, model: SensorModel, base: BaseFit, free: Free, to_step: float = STOP
 ) -> Descent:
-    """From a model and its unit down to the parameters `free` that suit what is seen best.
+    """Move the parameters `free` of a model to the least misfit.
 
-    Where steps have come to leave more, the best of where they led, the first of several that are as good; and no step
-    further that promises little and goes as far as one may.
-    to_step: misfit that a step has to promise, and the one before it to have removed; by default that of an effect
-    that was chosen.
+    Where later steps leave more, the best point is returned, the first of several that are as good.  A last step is not
+    taken if it promises little and is as long as a step may be.
+
+    Args:
+        probe: predicts the statistics of a model.
+        model: the model to start from.
+        free: parameters to move.
+        to_step: misfit that a step has to promise, and the step before to have removed; default: that of a chosen
+            effect.
     """
     null = problem.null
     at, base = at_settled_unit(probe, null, model, base, free)
@@ -111,15 +118,19 @@ def descend(
     least = min(t[0] for t in tried)
     guess = little and bool(np.any(np.abs(step) >= longest))
     if guess or left > least + problem.settings.deviance.by_chance:
-        return next(where for there, where in tried if there < least + STOP)
+        return next(point for misfit, point in tried if misfit < least + STOP)
     return Descent(model, base, replace(at, mean=at.mean + columns @ step), columns, noise, covariance)
 
 
 def broyden(columns: Floats, step: Floats, change: Floats, noise: Floats | float = 0.0) -> Floats:
-    """(S, n) derivatives that give the change (S,) that a step (n,) turned out to make, where there are any.
+    """Correct derivatives by the change that a step made; derivatives of 0 stay.
 
-    noise: (S,) largest surprise that is chance.  As a slope, that of a short step would look like knowledge of the
-    parameters."""
+    Args:
+        columns: (S, n) derivatives.
+        step: (n,) the step.
+        change: (S,) change of the statistics.
+        noise: (S,) largest surprise that is chance.  Over a short step, chance would look like knowledge.
+    """
     surprise = change - columns @ step
     corrected = (columns != 0) & (np.abs(surprise) > noise)[:, None]
     return np.asarray(columns + corrected * np.outer(surprise, step) / (step @ step))
@@ -139,17 +150,29 @@ def moved(model: SensorModel, base: BaseFit, free: Free, step: Floats) -> tuple[
 def derivatives(
     problem: Problem, probe: Probe, model: SensorModel, base: BaseFit, at: Prediction, free: Free
 ) -> tuple[Floats, Floats]:
-    """(S, n) change of the statistics for one more of each parameter's logarithm, and its noise; at: what the model
-    gives.  Each is taken under a unit that has settled: of one that has not, light that saturates says more than there
-    is.  What one parameter of an effect clearly moves says of its others that they do not, or how far."""
+    """Derivatives of the statistics by the parameters' logarithms, each under a unit that has settled.
+
+    Under a unit that has not, saturated light would say too much.  A statistic counts for all parameters of an effect
+    if one of them clearly moves it.
+
+    Args:
+        probe: predicts the statistics of a model.
+        at: the prediction of the model.
+        free: the n parameters.
+
+    Returns:
+        ((S, n) derivatives, (S, n) their standard deviations).
+    """
     null = problem.null
     peak = float(np.max(np.abs(at.mean - null.mean) / null.noise))
     sizes = np.array([derivative_step(name, key, peak) for name, key in free])
     with ThreadPoolExecutor(problem.case.jobs) as pool:
-        steps = [moved(model, base, [what], np.array([size])) for what, size in zip(free, sizes, strict=True)]
-        there = [made for made, _ in pool.map(lambda step: at_settled_unit(probe, null, step[0], step[1], free), steps)]
+        steps = [moved(model, base, [key], np.array([size])) for key, size in zip(free, sizes, strict=True)]
+        beside = [
+            made for made, _ in pool.map(lambda step: at_settled_unit(probe, null, step[0], step[1], free), steps)
+        ]
     changes, noise, clear = (
-        np.stack(v, axis=1) for v in zip(*(change_of(null, problem.seen, t, at) for t in there), strict=True)
+        np.stack(v, axis=1) for v in zip(*(change_of(null, problem.seen, p, at) for p in beside), strict=True)
     )
     same_effect = np.array([[name == other for name, _ in free] for other, _ in free])
     return np.where(clear @ same_effect, changes, 0.0) / sizes, noise / sizes
@@ -158,21 +181,20 @@ def derivatives(
 def at_settled_unit(
     probe: Probe, null: Null, model: SensorModel, base: BaseFit, free: Free
 ) -> tuple[Prediction, BaseFit]:
-    """(what a model gives under a unit that has settled, that unit): probed once more where it had not."""
+    """(prediction of a model under a settled unit, that unit), by a second prediction where the first unit moves."""
     made = probe(model, base)
-    there = unit_after(model, base, null, made, free)
-    return (made, base) if has_converged(base, there) else (probe(model, there), there)
+    settled = unit_after(model, base, null, made, free)
+    return (made, base) if has_converged(base, settled) else (probe(model, settled), settled)
 
 
 def unit_after(model: SensorModel, base: BaseFit, null: Null, made: Prediction, free: Free) -> BaseFit:
-    """`predict.settled_unit`, but for an s^2 that is fitted."""
-    there = settled_unit(model, constrained_refit(model, base), null, made)
-    return replace(there, white=base.white) if WHITE in free else there
+    """The unit that settles (`predict.settled_unit`); an s^2 that is fitted stays."""
+    settled = settled_unit(model, constrained_refit(model, base), null, made)
+    return replace(settled, white=base.white) if WHITE in free else settled
 
 
 def prior_sd(free: Free) -> Floats:
-    """(n,) logarithms by which parameters may differ, standard deviations, before anything is measured: a factor of e,
-    of a shape twice the step that its derivative takes."""
+    """(n,) standard deviations of the logarithms before any data: 1, of a shape twice the step of its derivative."""
     fitted = [name != WHITE[0] and key != candidate(name).strength for name, key in free]
     return np.array(
         [2 * abs(candidate(f[0]).shape_step) if shape else 1.0 for f, shape in zip(free, fitted, strict=True)]
@@ -180,14 +202,16 @@ def prior_sd(free: Free) -> Floats:
 
 
 def longest_of(free: Free) -> Floats:
-    """(n,) largest step of each logarithm at once: `LONGEST_STEP`, and no further than what was open of it before."""
+    """(n,) largest step of each logarithm at once: `LONGEST_STEP`, and no more than its `prior_sd`."""
     return np.minimum(prior_sd(free), LONGEST_STEP)
 
 
 def derivative_step(name: str, key: str, peak: float) -> float:
     """Step of a logarithm to take a derivative by, long enough to show above the twins' own noise.
 
-    peak: noises by which the effect shows.
+    Args:
+        peak: noises by which the effect shows.
+        shows: noises by which the step has to show.
     """
     if (name, key) == WHITE:
         return WHITE_STEP

@@ -1,4 +1,4 @@
-"""The last step: a joint refit of all parameters of the effects found, with their errors."""
+"""A joint refit of all parameters of the effects, with their errors."""
 
 from __future__ import annotations
 
@@ -25,74 +25,81 @@ OWN_SHARE = 0.9
 """Of the refit's s^2: a unit with a smaller share of its own is fitted with the effects."""
 
 
-def refined_together(problem: Problem, found: Fit, names: Sequence[str]) -> tuple[Fit, Errors, bool]:
-    """`found.model` with the parameters of its effects `names` refined, simulated anew; their errors; whether all
-    recordings were needed.
+def refined_together(problem: Problem, fitted: Fit, names: Sequence[str]) -> tuple[Fit, Errors, bool]:
+    """Refine the parameters of a fit's effects together, and simulate it anew.
 
-    Where the parameters that the recordings to fit give suit the held-out ones within their errors only, or others
-    within these do, all recordings give them.  problem: before any was added.
+    All recordings are fitted where the fit to the recordings to fit suits the held-out ones only within its errors.
+
+    Args:
+        problem: before any effect was added.
+        names: its effects.
+
+    Returns:
+        (the fit, errors of its parameters, whether all recordings were needed).
     """
     everywhere = problem.fitted_to_all
-    refined, errors, own2 = _refined(problem, found, names)
+    refined, errors, own2 = _refined(problem, fitted, names)
     error = np.sqrt(refined.prediction.error**2 + own2 * np.isnan(problem.seen))
-    open_ = replace(refined, prediction=replace(refined.prediction, error=error))
+    uncertain = replace(refined, prediction=replace(refined.prediction, error=error))
     if everywhere.is_explained(refined.prediction) or not problem.is_explained(refined.prediction):
-        return open_, errors, False
+        return uncertain, errors, False
     if not problem.allows("parameters from held-out recordings"):
-        return open_, errors, False
+        return uncertain, errors, False
     whole, known, _ = _refined(everywhere, refined, names)
-    suit = everywhere.is_explained(open_.prediction) or everywhere.is_explained(whole.prediction)
+    suit = everywhere.is_explained(uncertain.prediction) or everywhere.is_explained(whole.prediction)
     if not (suit and agree(refined, whole, errors, APART)):
-        return open_, errors, False
+        return uncertain, errors, False
     return replace(whole, misfit=problem.misfit(whole.prediction)), known, True
 
 
-def _refined(problem: Problem, found: Fit, names: Sequence[str]) -> tuple[Fit, Errors, Floats]:
-    """The fit, its errors, and (S,) by what variance statistics are unknown for them (`last_step`).
+def _refined(problem: Problem, fitted: Fit, names: Sequence[str]) -> tuple[Fit, Errors, Floats]:
+    """(the fit, errors, (S,) variance of the statistics by them), as `last_step` returns them.
 
-    Of what is not refined (`to_refine`), as of the others, derivatives are then taken anew for the last step."""
-    probe = _probe(problem, found, names)
-    free = to_refine(problem, found, names)
+    If parameters are not refined (`to_refine`), the derivatives of all are taken anew for the last step.
+    """
+    settings, probe = problem.settings, _probe(problem, fitted, names)
+    free = to_refine(problem, fitted, names)
     held = [parameter for parameter in fitted_of(names) if parameter not in free]
-    free += [WHITE] if is_noisy(problem, found.base) else []
-    now, base, slopes = found.model, found.base, None
+    free += [WHITE] if is_noisy(problem, fitted.base) else []
+    now, base, slopes = fitted.model, fitted.base, None
     if free:
         end = descend(problem, probe, now, base, free)
         now, base, slopes = end.model, end.base, Slopes.of_descent(free, end.columns, end.noise)
-    best = confirmed(problem, replace(found, model=now, base=base), problem.settings.twins.in_the_end)
-    if best.misfit > problem.misfit(found.prediction) + problem.settings.deviance.by_chance:
-        best = found
+    best = confirmed(problem, replace(fitted, model=now, base=base), settings.twins.in_the_end)
+    if best.misfit > problem.misfit(fitted.prediction) + settings.deviance.by_chance:
+        best = fitted
     if held or slopes is None:
         slopes = Slopes.at(problem, probe, best, free + held)
     return with_last_step(problem, best, names, slopes)
 
 
-def with_last_step(problem: Problem, found: Fit, names: Sequence[str], slopes: Slopes) -> tuple[Fit, Errors, Floats]:
-    """`last_step`, with the parameters and errors of the fit's own effect; these are no smaller than before where not
-    all of them are free."""
-    best, errors, own2 = last_step(problem, found, names, slopes)
-    errors[found.name] = no_smaller(errors[found.name], found.sd)
-    own = next(e for e in best.model.effects if e.name == found.name).parameters()
-    return replace(best, parameters={k: own[k] for k in found.parameters}, sd=errors[found.name]), errors, own2
+def with_last_step(problem: Problem, fitted: Fit, names: Sequence[str], slopes: Slopes) -> tuple[Fit, Errors, Floats]:
+    """`last_step`, and the parameters and errors of the fit's own effect brought up to date.
+
+    These errors are no smaller than before where not all of its parameters are free.
+    """
+    best, errors, own2 = last_step(problem, fitted, names, slopes)
+    errors[fitted.name] = no_smaller(errors[fitted.name], fitted.sd)
+    own = next(e for e in best.model.effects if e.name == fitted.name).parameters()
+    return replace(best, parameters={k: own[k] for k in fitted.parameters}, sd=errors[fitted.name]), errors, own2
 
 
-def stepped_once(problem: Problem, found: Fit, names: Sequence[str]) -> tuple[Fit, Errors]:
+def stepped_once(problem: Problem, fitted: Fit, names: Sequence[str]) -> tuple[Fit, Errors]:
     """The fit after one step of the parameters of its effects `names`, with errors that say so.
 
-    It takes the place of `refined_together` where the budget refuses that: derivatives at the fit, a twin each, are
-    the least that errors can be known by.
+    It replaces `refined_together` where the budget refuses that: errors need at least derivatives at the fit, a twin
+    each.
     """
     free = fitted_of(names)
-    free += [WHITE] if free and is_noisy(problem, found.base) else []
-    slopes = Slopes.at(problem, _probe(problem, found, names), found, free)
-    best, errors, own2 = with_last_step(problem, found, names, slopes)
+    free += [WHITE] if free and is_noisy(problem, fitted.base) else []
+    slopes = Slopes.at(problem, _probe(problem, fitted, names), fitted, free)
+    best, errors, own2 = with_last_step(problem, fitted, names, slopes)
     error = np.sqrt(best.prediction.error**2 + own2 * np.isnan(problem.seen))
     return replace(best, prediction=replace(best.prediction, error=error)), errors
 
 
 def fitted_of(names: Sequence[str]) -> list[tuple[str, str]]:
-    """All that is fitted of those effects whose course is not random, by effect and name: one twin has no direction of
-    the others."""
+    """Fitted parameters of effects, by effect and name, but of random courses: one twin shows no direction of those."""
     return [(name, key) for name in names if not candidate(name).random_course for key in candidate(name).fitted]
 
 
@@ -101,26 +108,30 @@ def is_noisy(problem: Problem, base: BaseFit) -> bool:
     return 0 < base.white < OWN_SHARE * problem.case.base.white
 
 
-def to_refine(problem: Problem, found: Fit, names: Sequence[str]) -> list[tuple[str, str]]:
-    """Parameters to descend by, by effect and name: all of `fitted_of`.  Where a descent by every shape would take more
-    than may be simulated, of several effects, and of one that leaves something, the strengths alone: what effects take
-    from each other is in these."""
+def to_refine(problem: Problem, fitted: Fit, names: Sequence[str]) -> list[tuple[str, str]]:
+    """Parameters to descend by, by effect and name: all of `fitted_of`, or the strengths alone.
+
+    The strengths alone where the budget refuses a descent by every shape.  Effects borrow from each other by their
+    strengths.  One effect that explains all is descended in full.
+    """
     free = fitted_of(names)
     strengths = [(name, key) for name, key in free if key == candidate(name).strength]
-    last = len(names) == 1 and problem.is_explained(found.prediction)
+    last = len(names) == 1 and problem.is_explained(fitted.prediction)
     if last or len(strengths) == len(free):
         return free
-    only, count = simulated_for(problem, found, names)
+    only, count = simulated_for(problem, fitted, names)
     cost = len(only) * count * (1 + len(free))
     return free if problem.allows("finer shapes of the effects found", cost) else strengths
 
 
-def simulated_for(problem: Problem, found: Fit, names: Sequence[str]) -> tuple[list[int], int]:
-    """(recordings, by index; twins) that say what the effects of a fit do; none of those that change the pattern alone,
-    for which units are drawn."""
+def simulated_for(problem: Problem, fitted: Fit, names: Sequence[str]) -> tuple[list[int], int]:
+    """(recordings to simulate, by index; number of twins) for the effects of a fit.
+
+    No recordings where all effects change the pattern alone: units are drawn for those.
+    """
     if Candidates(tuple(names)).all_pattern:
         return [], 1
-    only = with_held_out(problem.case, problem.affected(names, found.prediction.mean - problem.null.mean))
+    only = with_held_out(problem.case, problem.affected(names, fitted.prediction.mean - problem.null.mean))
     return only, max(twins_of(name) for name in names)
 
 
@@ -139,9 +150,9 @@ def agree(before: Fit, after: Fit, errors: Errors, apart: float) -> bool:
     return not any(is_apart(n, k, then[n][k], here[n][k], apart * sd) for n, k, sd in known)
 
 
-def _probe(problem: Problem, found: Fit, names: Sequence[str]) -> Probe:
+def _probe(problem: Problem, fitted: Fit, names: Sequence[str]) -> Probe:
     """Twins, and drawn units where an effect changes the pattern."""
-    only, count = simulated_for(problem, found, names)
+    only, count = simulated_for(problem, fitted, names)
 
     def statistics(model: SensorModel, base: BaseFit) -> Prediction:
         made = problem.null.prediction

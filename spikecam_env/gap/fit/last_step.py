@@ -1,4 +1,4 @@
-"""The last step of a fit: by its own twins, which are more than a descent's, with the errors of its parameters.
+"""The last step of a fit, by its own twins, with the errors of its parameters.  A fit has more twins than a descent.
 
     s' = s + step        s: logarithms of parameters        step, covariance: of `compare.step.step_of`
 
@@ -57,44 +57,44 @@ class Slopes:
 
     @classmethod
     def of_descent(cls, free: Free, columns: Floats, noise: Floats) -> Slopes:
-        """Those at the end of a descent."""
+        """Derivatives at the end of a descent."""
         return cls(tuple(free), columns, noise, once=False)
 
     @classmethod
-    def at(cls, problem: Problem, probe: Probe, found: Fit, free: Free) -> Slopes:
-        """Those at a fit, by a twin a parameter and one of the fit; none without parameters."""
+    def at(cls, problem: Problem, probe: Probe, fitted: Fit, free: Free) -> Slopes:
+        """Derivatives at a fit, by a twin a parameter and one of the fit; none without parameters."""
         if not free:
             none = np.zeros((len(problem.seen), 0))
             return cls((), none, none, once=True)
-        here, base = at_settled_unit(probe, problem.null, found.model, found.base, free)
-        columns, noise = derivatives(problem, probe, found.model, base, here, free)
+        here, base = at_settled_unit(probe, problem.null, fitted.model, fitted.base, free)
+        columns, noise = derivatives(problem, probe, fitted.model, base, here, free)
         return cls(tuple(free), columns, noise, once=True)
 
 
-def last_step(problem: Problem, found: Fit, names: Sequence[str], slopes: Slopes) -> tuple[Fit, Errors, Floats]:
-    """Move a fit by the step that its own twins ask for.
+def last_step(problem: Problem, fitted: Fit, names: Sequence[str], slopes: Slopes) -> tuple[Fit, Errors, Floats]:
+    """Move a fit by the step that its own twins give.
 
     Args:
         problem: before any effect was added.
-        found: the fit, simulated.
+        fitted: the fit, simulated.
         names: of its effects, whose errors are returned.
         slopes: derivatives at the fit.
 
     Returns:
         (the fit, moved where that leaves no more misfit; standard deviations by effect and parameter;
-        (S,) variance of the statistics by what is open of the parameters).  Derivatives that are noisy may leave two
-        parameters open that make up for each other, but not what both do: the variance is without their noise.
+        (S,) variance of the statistics by the errors of the parameters).  The variance is without the noise of the
+        derivatives: it leaves open two parameters that cancel, but not the sum of their effects.
     """
     errors: Errors = {name: {} for name in names}
     free = slopes.free
     if not free:
-        return found, errors, np.zeros(len(problem.seen))
+        return fitted, errors, np.zeros(len(problem.seen))
     before = prior_sd(free)
-    _, covariance = step_of(problem.null, problem.seen, found.prediction, slopes.columns, slopes.noise, before)
-    step, exact = step_of(problem.null, problem.seen, found.prediction, slopes.columns, before=before)
+    _, covariance = step_of(problem.null, problem.seen, fitted.prediction, slopes.columns, slopes.noise, before)
+    step, exact = step_of(problem.null, problem.seen, fitted.prediction, slopes.columns, before=before)
     if slopes.once:
-        step = linear_minimum(problem, found, slopes, before)
-    best, taken = _stepped(problem, found, slopes, step)
+        step = linear_minimum(problem, fitted, slopes, before)
+    best, taken = _stepped(problem, fitted, slopes, step)
     skipped = np.hypot(step - taken, curvature_of_step(free, taken) if slopes.once else 0.0)
     values = {e.name: e.parameters() for e in best.model.effects}
     for (name, key), e in zip(free, np.sqrt(np.diag(covariance) + skipped**2), strict=True):
@@ -104,13 +104,22 @@ def last_step(problem: Problem, found: Fit, names: Sequence[str], slopes: Slopes
     return best, errors, np.einsum("sn,nm,sm->s", slopes.columns, spread, slopes.columns)
 
 
-def linear_minimum(problem: Problem, found: Fit, slopes: Slopes, before: Floats) -> Floats:
-    """(n,) step to the minimum of the misfit, if the statistics were linear: what holds back a single step of
-    `step_of`, its damping and its robust weights, is no error of the parameters.  before: (n,) as of `step_of`."""
+def linear_minimum(problem: Problem, fitted: Fit, slopes: Slopes, before: Floats) -> Floats:
+    """Step to the minimum of the misfit, if the statistics were linear.
+
+    A single step of `step_of` is shorter by its damping and its robust weights, which are no error of the parameters.
+
+    Args:
+        slopes: derivatives at the fit.
+        before: (n,) standard deviations of the logarithms, as `step_of` takes them.
+
+    Returns:
+        (n,) step of the logarithms.
+    """
     total = np.zeros(len(slopes.free))
     for _ in range(MOST_LINEAR_STEPS):
-        there = replace(found.prediction, mean=found.prediction.mean + slopes.columns @ total)
-        step, _ = step_of(problem.null, problem.seen, there, slopes.columns, before=before)
+        predicted = replace(fitted.prediction, mean=fitted.prediction.mean + slopes.columns @ total)
+        step, _ = step_of(problem.null, problem.seen, predicted, slopes.columns, before=before)
         total = total + step
         if np.all(np.abs(step) < LEAST_LINEAR_STEP):
             break
@@ -118,14 +127,16 @@ def linear_minimum(problem: Problem, found: Fit, slopes: Slopes, before: Floats)
 
 
 def curvature_of_step(free: Free, taken: Floats) -> Floats:
-    """(n,) error of logarithms after one step (n,), which another one would remove: it is linear, and laws are not."""
+    """(n,) error of logarithms by the curvature of the laws, after one linear step `taken` (n,)."""
     powers = [1.0 if f == WHITE or f[1] != candidate(f[0]).strength else candidate(f[0]).power for f in free]
     return np.array(powers) * taken**2 / 2
 
 
 def _stepped(problem: Problem, best: Fit, slopes: Slopes, step: Floats) -> tuple[Fit, Floats]:
-    """(the fit moved, (n,) the step taken): none that leaves more.  After a descent none longer than one of a descent;
-    without, as far as that goes.  What one twin happened to scatter is in the parameters that it led to."""
+    """(the fit moved, (n,) the step taken): no step that leaves more misfit.
+
+    After a descent, a step longer than one of a descent is not taken.  Without one, it is cut to that length.
+    """
     longest = longest_of(slopes.free)
     step = np.clip(step, -longest, longest) if slopes.once else step
     predicted = replace(best.prediction, mean=best.prediction.mean + slopes.columns @ step)

@@ -1,4 +1,4 @@
-"""What a model with effects gives: twins of the null's draws, drawn units for the pattern, its unit settled."""
+"""Predictions of a model with effects: twins of the null's draws, drawn units for the pattern, its unit settled."""
 
 from __future__ import annotations
 
@@ -20,8 +20,10 @@ from spikecam_env.sensor import SensorModel
 def predict_by_twins(
     case: Case, model: SensorModel, base: BaseFit, null: Null, count: int, only: Sequence[int] | None = None
 ) -> Prediction:
-    """What a model with effects gives, from twins of the null's last `count` draws; what is not simulated (`only`:
-    recordings, by index) is as in `null`."""
+    """Predict a model with effects by twins of the null's last `count` draws.
+
+    Recordings that are not in `only` (by index) are as in `null`.
+    """
     numbers = [d.number for d in null.draws[-count:]]
     made = twins(case, model, base, numbers, only, {d.number: d.refit for d in null.draws})
     draws = [
@@ -36,8 +38,7 @@ def predict_by_twins(
 def with_drawn_pattern(
     case: Case, model: SensorModel, null: Null, predicted: Prediction, count: int | None = None
 ) -> Prediction:
-    """A prediction with its pattern statistics replaced by those of `count` units of the model; where None, of as many
-    as the null model has."""
+    """Replace the pattern statistics of a prediction by those of `count` units; None: as many as the null has."""
     count = null.settings.twins.drawn_units if count is None else count
     limits = null.settings.unit.spread_limits
     drawn = drawn_banks(model, case.base, case.conditions, case.shape, count, case.seed, limits)
@@ -53,7 +54,7 @@ def with_drawn_pattern(
 def settled_unit(model: SensorModel, base: BaseFit, null: Null, predicted: Prediction) -> BaseFit:
     """Indirect inference: adjust the unit until its twin with the effect refits to the null twin's refit without it."""
     [without] = [d.refit for d in null.draws if d.number == predicted.draws[-1].number]
-    there = predicted.draws[-1].refit
-    if not (without and there):
+    refit = predicted.draws[-1].refit
+    if not (without and refit):
         return base
-    return inferred_unit(model, base, without, [there])
+    return inferred_unit(model, base, without, [refit])

@@ -20,26 +20,26 @@ from spikecam_env.types import Floats
 
 @dataclass(frozen=True, eq=False)
 class Problem:
-    """A campaign and a model to add effects to.
-
-    case: the campaign, its unit as the model has it.  null: what the model predicts.
-    seen: (S,) measured statistics of the recordings to fit, NaN elsewhere.  values: (S,) those of all recordings.
-    """
+    """A campaign and a model to add effects to."""
 
     case: Case
+    """The campaign, its unit as the model has it."""
     model: SensorModel
     null: Null
+    """The prediction of the model."""
     seen: Floats
+    """(S,) measured statistics of the recordings to fit, NaN elsewhere."""
     values: Floats
+    """(S,) measured statistics of all recordings."""
 
     @staticmethod
     def of(case: Case, model: SensorModel, null: Null, values: Floats) -> Problem:
-        """With the recordings to fit that the case says."""
+        """The problem with the case's recordings to fit."""
         return Problem(case, model, null, values_to_fit(case, null, values), values)
 
     @property
     def settings(self) -> DiagnosisSettings:
-        """By which it is diagnosed."""
+        """Settings of the diagnosis."""
         return self.null.settings
 
     @property
@@ -48,15 +48,20 @@ class Problem:
         return replace(self, seen=self.values)
 
     def standing_on(self, model: SensorModel, base: BaseFit, predicted: Prediction) -> Problem:
-        """What is left to explain of a model with effects already added, its unit and what it predicts."""
+        """The problem that is left beside effects that were added.
+
+        Args:
+            model: the model with those effects.
+            predicted: its prediction.
+        """
         return replace(self, case=replace(self.case, base=base), model=model, null=standing_on(self.null, predicted))
 
     def residual_and_misfit(self, predicted: Prediction) -> tuple[Floats, float]:
-        """((S,) residual, misfit) of a prediction, by the recordings to fit."""
+        """((S,) residual, misfit) of a prediction on the recordings to fit."""
         return residual_and_misfit(self.null, self.seen, predicted)
 
     def misfit(self, predicted: Prediction | None = None) -> float:
-        """Of a prediction, by the recordings to fit; of the model itself where None."""
+        """Misfit of a prediction on the recordings to fit; default: of the model itself."""
         return self.residual_and_misfit(predicted or self.null.prediction)[1]
 
     def is_explained(self, predicted: Prediction) -> bool:
@@ -64,7 +69,7 @@ class Problem:
         return not is_significant(self.null, residual(self.null, self.seen, predicted), predicted)
 
     def predict(self, model: SensorModel, base: BaseFit, count: int, only: Sequence[int] | None = None) -> Prediction:
-        """What another model gives (`predict_by_twins`)."""
+        """The prediction of another model (`predict_by_twins`)."""
         return predict_by_twins(self.case, model, base, self.null, count, only)
 
     def with_pattern(self, model: SensorModel, predicted: Prediction, count: int | None = None) -> Prediction:
@@ -76,14 +81,17 @@ class Problem:
         return settled_unit(model, base, self.null, predicted)
 
     def affected(self, names: Sequence[str], change: Floats | None = None) -> list[int]:
-        """Recordings that effects concern, by index (`recordings_affected`).  change: (S,) of the statistics; where
-        None it may be everywhere."""
+        """Recordings that effects concern, by index (`recordings_affected`).
+
+        Args:
+            change: (S,) change of the statistics; None: it may be everywhere.
+        """
         everywhere = np.full(len(self.null.keys), np.inf)
         change = everywhere if change is None else change
         return recordings_affected(self.case, names, self.null, self.seen, change)
 
     def allows(self, what: str, recordings: int = 0, *, needed: bool = False) -> bool:
-        """Whether the budget does (`Budget.allows`)."""
+        """Whether the budget allows a step (`Budget.allows`)."""
         return self.case.budget.allows(what, recordings, needed=needed)
 
 
@@ -93,7 +101,7 @@ def values_to_fit(case: Case, null: Null, values: Floats) -> Floats:
 
 
 def standing_on(null: Null, predicted: Prediction) -> Null:
-    """Predictions of a model with effects already added, known no better than the tolerance of what they changed."""
+    """The null of a model with effects added; its floor contains the tolerance of their change."""
     floor = np.sqrt(null.floor**2 + law_error(null, predicted) ** 2 + own_variance(null, predicted))
     freedom = freedom_of(null, predicted)
     return replace(null, mean=predicted.mean, sd=predicted.spread, floor=floor, freedom=freedom, draws=predicted.draws)

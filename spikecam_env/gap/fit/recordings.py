@@ -20,17 +20,25 @@ OF_RANDOM_COURSE = 2 * OF_EVENTS
 
 
 def twins_of(name: str) -> int:
-    """Number of twins for an effect: several of a sparse one (few events, few random pixels) or a `mixed` one, which
-    cannot be simulated stronger to exceed one twin's noise, so that several are averaged."""
-    what = candidate(name)
-    return OF_EVENTS if what.events or what.few_pixels or what.mixed else 1
+    """Number of twins for an effect.
+
+    Several of a sparse one (few events, few random pixels) or a `mixed` one.  These cannot be simulated stronger to
+    exceed one twin's noise.
+    """
+    effect = candidate(name)
+    return OF_EVENTS if effect.events or effect.few_pixels or effect.mixed else 1
 
 
 def recordings_affected(case: Case, names: Sequence[str], null: Null, measured: Floats, effect: Floats) -> list[int]:
-    """Recordings of use fit on which effects show, or something has to be explained, by index; all where none does.
+    """Recordings to fit on which effects show, or a disagreement is, by index; all where there is none.
 
-    With those that the refit rests on: the refit takes up the effects' mean, and the others are judged by that refit.
-    Of effects that leave steady uniform light alone, only the others, where the refit does not rest on them.
+    They include those that the refit rests on: it takes up the effects' mean, and the others are judged by it.  Effects
+    that leave steady uniform light alone need only the others, unless the refit rests on one of these.
+
+    Args:
+        null: the prediction without them.
+        measured: (S,) statistics.
+        effect: (S,) change of the statistics by the effects.
     """
     off = np.maximum(np.abs(effect), np.abs(np.nan_to_num(measured - null.mean)))
     seen = off > CLEAR * null.noise
@@ -44,7 +52,7 @@ def recordings_affected(case: Case, names: Sequence[str], null: Null, measured: 
 
 
 def with_held_out(case: Case, only: Sequence[int]) -> list[int]:
-    """With the recordings held out: those in motion, and all where there is a refit to judge the others by."""
+    """Recordings `only` and the held-out ones: those in motion, and all where a refit can judge them."""
     held = {i for i, c in enumerate(case.conditions) if c.use != "fit"}
     if any(case.conditions[i].kind == "picture" for i in held):
         held |= refit_recordings(case)

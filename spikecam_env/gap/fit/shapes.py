@@ -1,6 +1,6 @@
 """The other parameters of a candidate, fitted together with its strength.
 
-They cost twins, one a parameter, and are asked for where they can matter alone.
+They cost twins, one a parameter, and are fitted only where they can matter.
 """
 
 from __future__ import annotations
@@ -26,10 +26,12 @@ WORTH = 0.5
 
 
 def with_shapes_to_fit(problem: Problem, before: float, fits: Sequence[Fit]) -> list[Fit]:
-    """Those of the fits whose other parameters can matter: that remove enough of what the best removes.
+    """Fits whose other parameters can matter: they remove a share (`Searching.worth`) of the best's misfit.
 
-    A fit with no other parameter that leaves nothing but chance, and less than they do, is not beaten by more
-    parameters.  before: misfit of none.
+    None of them where a fit without other parameters leaves less, and no more than chance.
+
+    Args:
+        before: misfit of the model itself.
     """
     least = min((f.misfit for f in fits), default=np.inf)
     simple = min((f for f in fits if not candidate(f.name).has_shapes), key=lambda f: f.misfit, default=None)
@@ -39,30 +41,30 @@ def with_shapes_to_fit(problem: Problem, before: float, fits: Sequence[Fit]) -> 
     return [f for f in fits if candidate(f.name).has_shapes and f.misfit < min(near, enough)]
 
 
-def with_fitted_shapes(problem: Problem, found: Fit, names: Sequence[str] = ()) -> Fit:
-    """The fit with all that is fitted of its candidate at its best; or of several effects `names`, at once."""
-    names = names or (found.name,)
-    only = problem.affected(names, found.prediction.mean - problem.null.mean)
+def with_fitted_shapes(problem: Problem, fitted: Fit, names: Sequence[str] = ()) -> Fit:
+    """The fit with all fitted parameters of its candidate, or of the effects `names`, at their best."""
+    names = names or (fitted.name,)
+    only = problem.affected(names, fitted.prediction.mean - problem.null.mean)
     count = max(twins_of(name) for name in names)
 
-    def probe(there: SensorModel, base: BaseFit) -> Prediction:
-        return problem.predict(there, constrained_refit(there, base), count, only)
+    def probe(model: SensorModel, base: BaseFit) -> Prediction:
+        return problem.predict(model, constrained_refit(model, base), count, only)
 
     free = [(name, key) for name in names for key in candidate(name).fitted]
-    end = descend(problem, probe, found.model, found.base, free, COMPARED)
-    shaped = where_ended(problem, found, end, free)
-    return found if shaped.misfit > found.misfit else shaped
+    end = descend(problem, probe, fitted.model, fitted.base, free, COMPARED)
+    shaped = where_ended(problem, fitted, end, free)
+    return fitted if shaped.misfit > fitted.misfit else shaped
 
 
-def where_ended(problem: Problem, found: Fit, end: Descent, free: Free) -> Fit:
-    """The fit where a descent over the parameters `free`, of other effects too, ended; its own errors."""
+def where_ended(problem: Problem, fitted: Fit, end: Descent, free: Free) -> Fit:
+    """The fit at the end of a descent over the parameters `free`, with errors of its own effect's."""
     rho, left = problem.residual_and_misfit(end.prediction)
-    values = next(e for e in end.model.effects if e.name == found.name).parameters()
+    values = next(e for e in end.model.effects if e.name == fitted.name).parameters()
     errors = zip(free, np.sqrt(np.diag(end.covariance)), strict=True)
     return replace(
-        found,
-        parameters={k: values[k] for k in found.parameters},
-        sd={k: error_of(name, k, values[k], float(e)) for (name, k), e in errors if name == found.name},
+        fitted,
+        parameters={k: values[k] for k in fitted.parameters},
+        sd={k: error_of(name, k, values[k], float(e)) for (name, k), e in errors if name == fitted.name},
         prediction=end.prediction,
         base=end.base,
         rho=rho,

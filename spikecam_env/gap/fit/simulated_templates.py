@@ -29,7 +29,7 @@ from spikecam_env.sensor import CATALOGUE, SensorModel
 from spikecam_env.types import Floats
 
 REFITTED = 3
-"""Twins that say what a model without the effect gives, refitted to a severe one."""
+"""Twins of a model without the effect, refitted to a campaign with a severe one."""
 
 PEAK = 40.0
 """Noises of the statistic that shows an effect best, of recordings to fit, at which its template is taken."""
@@ -40,7 +40,7 @@ def own_templates(case: Case, model: SensorModel, null: Null, names: Sequence[st
     unit = replace(case, base=unit_under(case, model))
     todo = [(n, p) for n in names if not candidate(n).is_pattern for p in template_parameters(n)]
     with ThreadPoolExecutor(case.jobs) as pool:
-        entries = tuple(pool.map(lambda what: simulated_template(unit, model, null, *what), todo))
+        entries = tuple(pool.map(lambda entry: simulated_template(unit, model, null, *entry), todo))
     return Templates(
         null.keys,
         null.noise,
@@ -85,12 +85,12 @@ def simulated_template(
 def severe_template(
     case: Case, model: SensorModel, null: Null, name: str, parameters: Mapping[str, float], times: float
 ) -> Template:
-    """A candidate's template where the unit's own refit is biased: its campaign as if it were a measurement."""
-    there = with_effect(model, name, parameters)
+    """A candidate's template where the unit's own refit is biased: its campaign is treated as a measurement."""
+    changed = with_effect(model, name, parameters)
     if candidate(name).is_pattern:
         return Template(name, dict(parameters), simulated_shift(case, model, null, name, parameters), times)
     seed = case.seed * 1000 + 7
-    made = simulate(there, constrained_refit(there, case.base), case.conditions, case.shape, seed)
+    made = simulate(changed, constrained_refit(changed, case.base), case.conditions, case.shape, seed)
     seen = case.of(case.conditions, made)
     without = twins(seen, model, constrained_refit(model, seen.base), range(REFITTED))
     mean = np.mean([values_of(t.bank, null.keys) for t in without], axis=0)
@@ -101,13 +101,19 @@ def severe_template(
 
 
 def simulated_shift(case: Case, model: SensorModel, null: Null, name: str, parameters: Mapping[str, float]) -> Floats:
-    """(S,) change of the statistics, in noise, that a candidate makes: by units drawn, or by a twin of the unit that
-    indirect inference gives: else a refit would take up a bend of the rates, and saturation show a unit too bright."""
-    there = with_effect(model, name, parameters)
+    """(S,) change of the statistics by a candidate, in noise: by drawn units, or by a twin of a settled unit.
+
+    Under another unit the refit would take up a bend of the rates, and saturation would show a unit too bright.
+    """
+    changed = with_effect(model, name, parameters)
     if candidate(name).is_pattern:
-        made = with_drawn_pattern(case, there, null, null.prediction)
+        made = with_drawn_pattern(case, changed, null, null.prediction)
     else:
         made, _ = at_settled_unit(
-            partial(predict_by_twins, case, null=null, count=1), null, there, constrained_refit(there, case.base), []
+            partial(predict_by_twins, case, null=null, count=1),
+            null,
+            changed,
+            constrained_refit(changed, case.base),
+            [],
         )
     return in_noise(null, made.mean)

@@ -21,7 +21,7 @@ MODEL = "scsim"
 def standard_case(
     jobs: int = 1, seed: int = SEED, count: int = 12, preset: str = MODEL
 ) -> tuple[Case, SensorModel, Null]:
-    """(the case, its model, what `count` twins of the model predict)."""
+    """(the case, its model, the prediction of `count` twins of the model)."""
     model = SensorModel.preset(preset)
     conditions = planned_conditions(standard_design(), SHAPE, FRAMES)
     unit = model.draw_unit(SHAPE, seed)

@@ -2,7 +2,7 @@
 
 A candidate without a shipped template, such as a user's own effect, or one whose law is another than the shipped
 template's, is simulated on the standard case: the same camera, recordings and seeds whatever is being diagnosed.  So
-an answer does not depend on what is in the cache.
+an answer does not depend on the cache.
 """
 
 from __future__ import annotations
@@ -49,7 +49,9 @@ _IN_MEMORY: dict[str, Templates] = {}
 def templates_of(names: Sequence[str], *, jobs: int = 1, progress: bool = False) -> Templates:
     """The shipped templates, with those of candidates in `names` that have none of their present law.
 
-    jobs: threads, which change no bit.  progress: a bar where something has to be simulated.
+    Args:
+        jobs: threads, which change no bit.
+        progress: show a bar where something has to be simulated.
     """
     shipped = shipped_templates()
     lacking = {name: key_of(name) for name in names if is_lacking(name, shipped)}
@@ -89,7 +91,9 @@ def entries_of(
 ) -> Iterator[Template]:
     """A candidate's templates: of each shape a weak one, then severe ones, as far as its bounds let it be stronger.
 
-    kept: called with each one's label and what makes it, to keep it.
+    Args:
+        standard: the standard case.
+        kept: called with the label of each and the function that makes it; returns the template.
     """
     strength = CATALOGUE[name].strength
     for start in template_parameters(name):
@@ -97,15 +101,15 @@ def entries_of(
         last = weak = kept(label, partial(simulated_template, *standard, name, start))
         yield weak
         for times in SEVERE:
-            there = bounded(name, {**weak.parameters, strength: times * weak.parameters[strength]})
-            if there == last.parameters:
+            stronger = bounded(name, {**weak.parameters, strength: times * weak.parameters[strength]})
+            if stronger == last.parameters:
                 continue
-            last = kept(f"{label}-x{times:g}", partial(severe_template, *standard, name, there, times))
+            last = kept(f"{label}-x{times:g}", partial(severe_template, *standard, name, stronger, times))
             yield last
 
 
 def templates_on(standard: Standard, entries: Sequence[Template], names: Sequence[str]) -> Templates:
-    """Entries that were simulated on the standard case, as a bank; laws: of the candidates as they are now."""
+    """Entries that were simulated on the standard case as a bank, with the present laws of the candidates."""
     case, _, null = standard
     return Templates(
         null.keys,
@@ -118,7 +122,7 @@ def templates_on(standard: Standard, entries: Sequence[Template], names: Sequenc
 
 
 def key_of(name: str) -> str:
-    """A digest of what a candidate's templates depend on: its law, the standard camera, its recordings, the version."""
+    """A digest of a candidate's law, the standard camera, its recordings and the version: the key of its templates."""
     depends = (
         law_digest(CATALOGUE[name]),
         SensorModel.preset(standard_case.MODEL).toml(),
@@ -130,7 +134,7 @@ def key_of(name: str) -> str:
 
 
 def _kept(key: str, name: str) -> Templates | None:
-    """Those in memory or in the cache; a file that is damaged, or of something else, is as good as none."""
+    """Templates in memory or in the cache; a file that is damaged, or of something else, counts as none."""
     path = _path(key)
     if key not in _IN_MEMORY and path is not None:
         with suppress(InputError):
@@ -141,7 +145,7 @@ def _kept(key: str, name: str) -> Templates | None:
 
 
 def _keep(made: Templates, key: str) -> None:
-    """In memory, and in the cache where it can be written to."""
+    """Keep templates in memory, and in the cache where it can be written to."""
     _IN_MEMORY[key] = rounded(made)
     path = _path(key)
     if path is not None:

@@ -1,8 +1,8 @@
 """Recordings that are rates only: how pixels differ, in the light and in the dark, is all that can be tested.
 
 A twin is a fresh unit of the model, counted as the maps were; its median response and dark level are the measured ones.
-Spreads of response and of dark level are free within what units differ by (`settings.UnitSettings.spread_limits`)
-before, and without limit in the fits; one that then is further off than units are is a parameter that is wrong.
+Before the fits, spreads of response and of dark level are free within the differences of units
+(`settings.UnitSettings.spread_limits`).  In the fits they have no limit: one further off is a wrong parameter.
 """
 
 from spikecam_env.gap.maps.diagnose import diagnose_maps

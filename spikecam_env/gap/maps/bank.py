@@ -19,22 +19,23 @@ from spikecam_env.types import Floats
 
 @dataclass(frozen=True)
 class RateMap:
-    """One recording of rates.  rate: (H, W) [spikes/frame], spread within a count."""
+    """One recording of rates."""
 
     shown: Condition
     rate: Floats
+    """(H, W) rates [spikes/frame], spread within a count."""
 
 
 @dataclass(frozen=True)
 class MapCase:
-    """All of a campaign.  response: medians of lit maps less the dark's, by name.  dark: median dark level.
-
-    settings: by which it is diagnosed."""
+    """All maps of a campaign."""
 
     shape: tuple[int, int]
     maps: tuple[RateMap, ...]
     response: dict[str, float]
+    """Medians of lit maps less the dark's, by name [spikes/frame]."""
     dark: float
+    """Median dark level [spikes/frame]."""
     seed: int
     jobs: int
     settings: DiagnosisSettings = field(default_factory=DiagnosisSettings)
@@ -63,11 +64,12 @@ def read_maps(campaign: Campaign, seed: int, jobs: int, settings: DiagnosisSetti
 
 
 def spread_evenly(rate: Floats, frames: int) -> Floats:
-    """Rates spread within a count: of ten spikes a pixel in the dark, quantiles else say which whole number it is."""
+    """Rates spread within a count: else quantiles of ten spikes a pixel would be whole numbers."""
     return rate + (np.random.default_rng(frames).random(rate.shape) - 0.5) / frames
 
 
 def dark_of(maps: Sequence[RateMap]) -> Floats | None:
+    """(H, W) mean of the dark maps."""
     dark = [m.rate for m in maps if m.shown.kind == "dark"]
     return np.mean(dark, axis=0) if dark else None
 
@@ -75,13 +77,13 @@ def dark_of(maps: Sequence[RateMap]) -> Floats | None:
 def map_bank(maps: Sequence[RateMap]) -> dict[StatisticKey, float]:
     """Statistics of every map; texture of lit ones less the dark."""
     dark = dark_of(maps)
-    found = {}
+    statistics = {}
     for m in maps:
         own = m.rate if m.shown.kind == "dark" or dark is None else m.rate - dark
         for group, values in (("pattern", pattern.statistics(m.rate)), ("texture", texture.statistics(own))):
             for name, value in values.items():
-                found[StatisticKey(group, m.shown.name, name)] = value
-    return found
+                statistics[StatisticKey(group, m.shown.name, name)] = value
+    return statistics
 
 
 def unit_maps(model: SensorModel, case: MapCase, number: int) -> tuple[RateMap, ...]:
@@ -108,6 +110,6 @@ def unit_levels(model: SensorModel, case: MapCase, number: int) -> tuple[Floats,
 
 
 def with_use(case: MapCase, keys: Sequence[StatisticKey], use: str) -> NDArray[np.bool_]:
-    """(S,) which statistics are of recordings of this use."""
+    """(S,) whether a statistic is of a recording of this use."""
     names = {m.shown.name for m in case.maps if m.shown.use == use}
     return np.array([k.recording in names for k in keys])

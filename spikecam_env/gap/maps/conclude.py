@@ -1,4 +1,4 @@
-"""From a search among maps to a verdict."""
+"""The verdict by a search among maps."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ MOST_RELATIVE_SD = 10.0
 """Standard deviation of a parameter's logarithm from which no error is stated: of an effect that does nothing."""
 
 LISTED = 6
-"""Statistics that are listed of what is left."""
+"""Number of statistics that are listed of the remainder."""
 
 
 def conclude_maps(
@@ -56,42 +56,56 @@ def conclude_maps(
 ) -> Conclusion:
     """The verdict of a search.
 
-    rounds: spreads alone, then the fits of each round, best first; rejected: those of the round that added none.
+    Args:
+        tested: the model under test.
+        null: its prediction.
+        values: (S,) measured statistics.
+        rounds: spreads alone, then the fits of each round, the best first.
+        rejected: fits of the round that added none.
+        not_testable: names of candidates that the maps cannot show, each with the recording that it needs.
     """
     last = rounds[-1][0] if rounds else None
     rho = last.rho if last else residual(null, values, null.prediction)
     predicted = last.predicted if last else null.mean
-    square = [float(np.mean(((values - mean) / null.noise) ** 2)) for mean in (null.mean, predicted)]
-    left = (square[1] - 1.0) / max(square[0] - 1.0, 1e-9)
-    significant = is_significant(null, rho)
-    explained = not rounds or not significant or left < case.settings.maps.most_left
+    left = share_left(null, values, predicted)
+    is_left = is_significant(null, rho)
+    explained = not rounds or not is_left or left < case.settings.maps.most_left
     parameters = spreads_off(case, last.state) if last else {}
     effects = significant_effects(case, null, values, rounds)
-    found = [e.name for e in effects]
-    if not explained:
-        verdict = "unknown"
-    elif effects:
-        verdict = "named"
-    else:
-        verdict = "parameter" if parameters else "none"
+    by_effects = "named" if effects else "parameter" if parameters else "none"
     return Conclusion(
-        verdict=verdict,
+        verdict=by_effects if explained else "unknown",
         effects=effects if explained else (),
-        unknown=None if explained else maps_structure(null, rho, left, found),
+        unknown=None if explained else maps_structure(null, rho, left, [e.name for e in effects]),
         class_=None,
         parameters=parameters,
-        data=(note_on_what_is_left(null, rho, left),) if rounds and explained and significant else (),
+        data=(note_on_remainder(null, rho, left),) if rounds and explained and is_left else (),
         gap=gap_of_maps(case, null, values, predicted),
         statistics=map_statistics(case, null, values, predicted, rho),
-        ranking=tuple(
-            ranked_fit(
-                fit, was[0].misfit, r[0].name, fit is r[0] and r is not rejected, case.settings.deviance.accept_map
-            )
-            for was, r in itertools.pairwise([*rounds, rejected])
-            for fit in r
-        ),
+        ranking=map_ranking([*rounds, rejected], rejected, case.settings.deviance.accept_map),
         not_testable=tuple(not_testable),
         patched=patched_model(case, tested, last),
+    )
+
+
+def share_left(null: Null, values: Floats, predicted: Floats) -> float:
+    """Share of the mean square distance beyond chance that a prediction (S,) leaves."""
+    before, after = (float(np.mean(((values - mean) / null.noise) ** 2)) for mean in (null.mean, predicted))
+    return (after - 1.0) / max(before - 1.0, 1e-9)
+
+
+def map_ranking(rounds: Sequence[Sequence[MapFit]], rejected: Sequence[MapFit], accept: float) -> tuple[Ranked, ...]:
+    """Rows of the fits of every round after the first.
+
+    Args:
+        rounds: fits of each round, the best first.
+        rejected: the round that added none.
+        accept: reduction in misfit that an effect has to make.
+    """
+    return tuple(
+        ranked_fit(fit, before[0].misfit, fits[0].name, fit is fits[0] and fits is not rejected, accept)
+        for before, fits in itertools.pairwise(rounds)
+        for fit in fits
     )
 
 
@@ -99,16 +113,16 @@ def significant_effects(
     case: MapCase, null: Null, values: Floats, rounds: Sequence[Sequence[MapFit]]
 ) -> tuple[NamedEffect, ...]:
     """The best of each round after the first, where its strength is significant in the end."""
-    found = []
+    effects = []
     for fits in rounds[1:]:
         if has_clear_strength(rounds[-1][0], fits[0].name, LARGEST_SD):
             instead = {f.name: gap_of_maps(case, null, values, f.predicted).removed for f in fits[1:]}
-            found.append(named_effect(fits, rounds[-1][0], instead))
-    return tuple(found)
+            effects.append(named_effect(fits, rounds[-1][0], instead))
+    return tuple(effects)
 
 
 def map_statistics(case: MapCase, null: Null, values: Floats, predicted: Floats, rho: Floats) -> tuple[Statistic, ...]:
-    """Every statistic, measured, before and after; rho: (S,) what is left, in noise."""
+    """Every statistic, measured, before and after; rho: (S,) residuals, in noise."""
     use, z = with_use(case, null.keys, "fit"), deviates(null, values)
     p = adjusted(z)
     return tuple(
@@ -131,22 +145,25 @@ def patched_model(case: MapCase, tested: SensorModel, last: MapFit | None) -> Se
 
 def spreads_off(case: MapCase, state: PatternModel) -> dict[str, dict[str, float]]:
     """Spreads of the model that this unit has in another amount than units differ by: as `baseline.off_nominal`."""
-    found = {}
-    for what, factor in state.factors.items():
+    rows = {}
+    for kind, factor in state.factors.items():
         if not unusual(factor, case.settings.unit.usual):
             continue
         for effect in state.model.effects:
-            if effect.name in FITTED_SPREADS[what]:
-                key = FITTED_SPREADS[what][effect.name]
+            if effect.name in FITTED_SPREADS[kind]:
+                key = FITTED_SPREADS[kind][effect.name]
                 nominal = effect.parameters()[key]
-                found[effect.name] = {"measured": nominal * factor, "nominal": nominal, "ratio": factor}
-    return found
+                rows[effect.name] = {"measured": nominal * factor, "nominal": nominal, "ratio": factor}
+    return rows
 
 
 def named_effect(tried: Sequence[MapFit], last: MapFit, instead: dict[str, float]) -> NamedEffect:
-    """The best of a round, with parameters as they are in the end; confidence and rivals are the round's.
+    """The best of a round, with its last parameters; confidence and rivals are the round's.
 
-    instead: share of the gap that the others would remove.
+    Args:
+        tried: fits of the round, the best first.
+        last: the last fit.
+        instead: share of the gap that the others would remove.
     """
     best = tried[0]
     weights = [(t.name, float(np.exp(-max(t.misfit - best.misfit, 0.0) / 2))) for t in tried[1:]]
@@ -162,8 +179,7 @@ def named_effect(tried: Sequence[MapFit], last: MapFit, instead: dict[str, float
 
 
 def has_clear_strength(last: MapFit, name: str, largest_sd: float) -> bool:
-    """Whether an effect's strength is known in the end to a relative standard deviation: a later one may take its
-    place."""
+    """Whether an effect's last strength is known to a relative standard deviation: a later one may replace it."""
     return last.sd[f"{name}.{CATALOGUE[name].strength}"] < largest_sd
 
 
@@ -176,14 +192,22 @@ def fit_estimates(tried: MapFit, name: str) -> dict[str, Estimate]:
 
 
 def _estimate(name: str, key: str, value: float, sd: float) -> Estimate:
-    """sd: of what was fitted, the value or its logarithm."""
+    """sd: standard deviation of the value, where that was fitted, or of its logarithm."""
     linear = key in LINEAR_PARAMETERS
     own = sd * (1.0 if linear else value)
     return Estimate(value, own, interval_of(name, key, value, own, by_steps=linear))
 
 
 def ranked_fit(t: MapFit, before: float, best: str, accepted: bool, accept: float) -> Ranked:
-    """A row of the ranking.  best: the candidate of its round that leaves least.  accept: reduction that is asked."""
+    """A row of the ranking.
+
+    Args:
+        t: the fit.
+        before: misfit before its round.
+        best: the best candidate of its round.
+        accepted: whether it was added.
+        accept: reduction in misfit that an effect has to make.
+    """
     worst = float(np.abs(t.rho).max())
     against = why_rejected(t.misfit, before, best, accept)
     reason = f"leaves {worst:.1f} noises at worst" if accepted else against
@@ -196,7 +220,7 @@ def worst_left(null: Null, rho: Floats) -> list[str]:
     return [f"{null.keys[j].recording} {null.keys[j].name} ({rho[j]:+.1f})" for j in order]
 
 
-def note_on_what_is_left(null: Null, rho: Floats, left: float) -> str:
+def note_on_remainder(null: Null, rho: Floats, left: float) -> str:
     """A note on a name that does not explain everything."""
     return (
         f"the named effects leave {100 * left:.1f} % of the mean square distance, more than chance; "

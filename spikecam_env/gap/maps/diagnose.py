@@ -1,4 +1,4 @@
-"""From maps of rates to a verdict."""
+"""Diagnosis of maps of rates."""
 
 from __future__ import annotations
 
@@ -28,10 +28,17 @@ def diagnose_maps(
     jobs: int = 1,
     settings: DiagnosisSettings | None = None,
 ) -> tuple[Conclusion, Evidence]:
-    """Find what fixed pattern a model lacks, from rates alone.
+    """Find the fixed pattern that a model lacks, from rates alone.
 
-    names: of candidates.  seed, jobs, settings: as in `diagnose.diagnose`.  Raises InputError where no rates are in
-    known light, and for settings of another type.
+    Args:
+        model: the model under test.
+        names: names of the candidates.
+        seed: as in `diagnose.diagnose`.
+        jobs: as in `diagnose.diagnose`.
+        settings: as in `diagnose.diagnose`.
+
+    Raises:
+        InputError: where no rates are in known light, and for settings of another type.
     """
     case = read_maps(campaign, seed, jobs, checked_settings(settings))
     tested = [n for n in names if candidate(n).is_pattern and shows_in_maps(n, case)]
@@ -49,13 +56,13 @@ def diagnose_maps(
 
 
 def shows_in_maps(name: str, case: MapCase) -> bool:
-    """Dark effects want a dark map, all others a lit one; what is one number with a spread of the model is none."""
+    """Whether the maps can show a candidate: dark effects need a dark map, all others a lit one."""
     kinds = {m.shown.kind for m in case.maps}
     return "dark" in kinds if candidate(name).family == "dark" else bool(kinds & {"flat", "picture"})
 
 
 def needs(name: str) -> str:
-    """What would show a candidate that these maps do not."""
+    """The recording that would show a candidate which these maps do not."""
     if not candidate(name).is_pattern:
         return "spikes: rates say nothing of when they come"
     return "a dark map" if candidate(name).family == "dark" else "a map of a flat"

@@ -1,4 +1,4 @@
-"""What the report draws of maps: response and dark level of every pixel, measured and of fresh units."""
+"""Evidence for the report: response and dark level of every pixel, measured and of fresh units."""
 
 from __future__ import annotations
 

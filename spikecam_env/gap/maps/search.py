@@ -1,4 +1,4 @@
-"""Which effects of the pattern are in the maps: candidates fitted, the best added, while something is left.
+"""Search for effects of the pattern in maps: candidates fitted, the best added, while something is left.
 
 Parameters are fitted by Gauss-Newton on the statistics, with the same draws at every step, together with all that were
 added before and the model's own spreads; how a spread is shared between a Gaussian and a tail is nearly free, and
@@ -28,7 +28,7 @@ STEPS = 6
 """Steps of a fit."""
 
 FITTED_SPREADS = {"response": UNIT_SPREADS["gain"], "dark": UNIT_SPREADS["dark"]}
-"""What is scaled to fit how pixels differ: parameters of effects, by what they spread."""
+"""Parameters that are scaled to fit how pixels differ: by the quantity they spread, then by effect."""
 
 LINEAR_PARAMETERS = ("centre_x", "centre_y")
 """Parameters that are fitted in their own unit; all others are fitted by their logarithm."""
@@ -42,33 +42,39 @@ FIRST_DAMPING = 0.02
 
 @dataclass(frozen=True)
 class PatternModel:
-    """A model on its way: names of effects added to it, and factors of its own spreads."""
+    """A model in the search."""
 
     model: SensorModel
     factors: dict[str, float]
+    """Factors of its own spreads."""
     added: tuple[str, ...] = ()
+    """Names of the effects that were added."""
 
     @property
     def fitted(self) -> SensorModel:
         """The model with its spreads scaled."""
         out = self.model
-        for what, spreads in FITTED_SPREADS.items():
+        for kind, spreads in FITTED_SPREADS.items():
             for effect in self.model.effects:
-                if effect.name in spreads and what in self.factors:
+                if effect.name in spreads and kind in self.factors:
                     key = spreads[effect.name]
-                    out = out.with_effect(replace(effect, **{key: effect.parameters()[key] * self.factors[what]}))
+                    out = out.with_effect(replace(effect, **{key: effect.parameters()[key] * self.factors[kind]}))
         return out
 
 
 @dataclass(frozen=True)
 class MapFit:
-    """A fit.  name: of the candidate, "" for spreads alone.  parameters, sd: of the candidate, and of factors."""
+    """A fit of a candidate beside those that were added before."""
 
     name: str
+    """Name of the candidate, "" for spreads alone."""
     state: PatternModel
     sd: dict[str, float]
+    """Standard deviations, by "effect.parameter" and of the factors."""
     predicted: Floats
+    """(S,) predicted statistics."""
     rho: Floats
+    """(S,) residuals, in noise."""
     misfit: float
 
 
@@ -88,16 +94,16 @@ def spreads_matched(state: PatternModel, case: MapCase, measured: dict[Statistic
     for _ in range(2):
         simulated = map_bank(unit_maps(state.fitted, case, 0))
         factors = dict(state.factors)
-        for what, kinds in (("response", ("flat", "picture")), ("dark", ("dark",))):
+        for spread, kinds in (("response", ("flat", "picture")), ("dark", ("dark",))):
             keys = [
                 StatisticKey("texture", m.shown.name, "fine")
                 for m in case.maps
                 if m.shown.kind in kinds and m.shown.use == "fit"
             ]
             off = [measured[k] - simulated[k] for k in keys if k in measured and k in simulated]
-            if off and any(e.name in FITTED_SPREADS[what] for e in state.model.effects):
-                factors[what] = float(
-                    np.clip(factors.get(what, 1.0) * np.exp(np.mean(off)), *case.settings.unit.spread_limits)
+            if off and any(e.name in FITTED_SPREADS[spread] for e in state.model.effects):
+                factors[spread] = float(
+                    np.clip(factors.get(spread, 1.0) * np.exp(np.mean(off)), *case.settings.unit.spread_limits)
                 )
         state = replace(state, factors=factors)
     return state
@@ -106,8 +112,12 @@ def spreads_matched(state: PatternModel, case: MapCase, measured: dict[Statistic
 def search_maps(
     case: MapCase, given: PatternModel, null: Null, values: Floats, names: Sequence[str]
 ) -> tuple[list[list[MapFit]], list[MapFit]]:
-    """(rounds, rejected): the spreads alone; then, each round, candidates, the one that leaves least first; and what
-    was tried last and did not help."""
+    """Add candidates while something is left.
+
+    Returns:
+        (rounds, rejected): the spreads alone, then the fits of each round, the best first; the fits of the last round,
+        if it did not help.
+    """
     rounds = [[fit_candidate(case, given, null, values, "")]]
     left = list(names)
     while left and len(rounds) <= case.settings.maps.most_effects:
@@ -161,13 +171,13 @@ def fit_candidate(case: MapCase, start: PatternModel, null: Null, values: Floats
 
 
 def fitted_parameters(name: str) -> tuple[str, ...]:
-    """What is fitted of a candidate: as in the table, and where it has a centre."""
+    """Fitted parameters of a candidate: those of the table, and its centre."""
     return (*candidate(name).fitted, *(p for p in LINEAR_PARAMETERS if p in CATALOGUE[name].__dataclass_fields__))
 
 
-def _moved(state: PatternModel, what: tuple[str, str], step: float) -> PatternModel:
+def _moved(state: PatternModel, parameter: tuple[str, str], step: float) -> PatternModel:
     """A parameter changed by a step, of its logarithm or in its own unit."""
-    name, key = what
+    name, key = parameter
     if not name:
         return replace(
             state, factors={**state.factors, key: float(np.clip(state.factors[key] * np.exp(step), 1e-3, 1e3))}

@@ -2,9 +2,8 @@
 
     x (1 + tau x) / (1 + tau x (1 + tau x)) = x (1 - (tau x)^2 + ...)        of each alone a part in tau x
 
-Forward selection does not find the way to both: the best of one alone, a stand-in for what they leave, is far smaller
-than either.  What they leave together goes with the square of their strength, and so one twin of both says how strong
-they are.
+Forward selection does not find both: the best fit of one alone stands in for the second order, and is far smaller than
+either.  The change by both goes with the square of their strength, so one twin of both gives the strength.
 """
 
 from __future__ import annotations
@@ -32,9 +31,12 @@ START_US = 1.0
 def fit_pair(problem: Problem, names: Collection[str]) -> Fit | None:
     """Fit both effects at once, by one strength.
 
+    Args:
+        problem: the problem before any effect was added.
+
     Returns:
-        A fit of the second whose model has both.  None if only a strength of the wrong sign would do, or if one of
-        them is not among the candidates `names`.
+        A fit of the second whose model has both.  None if the strength has the wrong sign, or if one of them is no
+        candidate.
     """
     if not set(PAIR) <= set(names):
         return None
@@ -45,9 +47,9 @@ def fit_pair(problem: Problem, names: Collection[str]) -> Fit | None:
         with_both(problem.model, tau_us, frame_rate_hz), constrained_refit(problem.model, problem.case.base)
     )
     for _ in range(MOST_STEPS):
-        there = with_both(problem.model, tau_us, frame_rate_hz)
-        predicted = problem.predict(there, base, 1, only)
-        base = problem.settled_unit(there, base, predicted)
+        model = with_both(problem.model, tau_us, frame_rate_hz)
+        predicted = problem.predict(model, base, 1, only)
+        base = problem.settled_unit(model, base, predicted)
         square, _ = scale_to(problem.null, problem.seen, predicted)
         if square <= 0:
             return None
@@ -57,13 +59,13 @@ def fit_pair(problem: Problem, names: Collection[str]) -> Fit | None:
             break
     predicted = with_change_scaled(problem.null, predicted, factor**2)
     rho, left = problem.residual_and_misfit(predicted)
-    there = with_both(problem.model, tau_us, frame_rate_hz)
-    beta = next(e for e in there.effects if e.name == PAIR[1]).parameters()
-    return Fit(PAIR[1], {"beta": beta["beta"]}, {}, predicted, base, rho, left, there)
+    model = with_both(problem.model, tau_us, frame_rate_hz)
+    beta = next(e for e in model.effects if e.name == PAIR[1]).parameters()
+    return Fit(PAIR[1], {"beta": beta["beta"]}, {}, predicted, base, rho, left, model)
 
 
 def with_both(model: SensorModel, tau_us: float, frame_rate_hz: float) -> SensorModel:
     """The model with a dead time and the non-linearity that cancels it."""
     beta = -tau_us * 1e-6 * frame_rate_hz
-    there = with_effect(model, PAIR[0], bounded(PAIR[0], {"tau_us": tau_us}))
-    return with_effect(there, PAIR[1], bounded(PAIR[1], {"beta": beta}))
+    bent = with_effect(model, PAIR[0], bounded(PAIR[0], {"tau_us": tau_us}))
+    return with_effect(bent, PAIR[1], bounded(PAIR[1], {"beta": beta}))

@@ -53,11 +53,11 @@ def chosen_of(here: Problem, draws: Sequence[Draw], confirmed: Sequence[Fit]) ->
     """Choose among confirmed fits, and find the rivals of the chosen one.
 
     All recordings decide between those that the recordings to fit do not separate from the first.  A fit with one more
-    parameter is chosen if its misfit is smaller by a tie.  It is a rival if its misfit is smaller by what a parameter
-    without a meaning removes (PER_PARAMETER).
+    parameter is chosen if its misfit is smaller by a tie.  It is a rival if its misfit is smaller by PER_PARAMETER, as
+    much as a parameter without a meaning removes.
 
     Args:
-        here: what the candidates were added to.
+        here: the problem of the candidates, with the effects before them.
         draws: campaigns of the model as given.
         confirmed: fits, the best first.
 

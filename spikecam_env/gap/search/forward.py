@@ -2,9 +2,9 @@
 
     [screen -> fit -> shape -> confirm -> add -> try neighbours -> refine all]*
 
-Held-out recordings take no part but in the choice between what others cannot distinguish, within errors in parameters
-that others leave open, and in whether anything is left to look for: where they alone disagree, what moves among them is
-fitted from there on.
+Held-out recordings are used for three things only.  They decide between candidates that the others do not distinguish,
+and fix parameters within the errors that the others leave.  They also show whether anything is left: where they alone
+disagree, those in motion are fitted from then on.
 """
 
 from __future__ import annotations
@@ -55,14 +55,17 @@ SECOND = "a second effect"
 """Without having looked for it, nothing is named where something is left."""
 
 ANOTHER = {1: SECOND, 2: "a third effect"}
-"""What is looked for beside so many."""
+"""Name of the search for one effect more, by the number that was added."""
 
 
 def forward_selection(problem: Problem, names: Sequence[str], templates: Templates) -> list[Round]:
-    """Forward selection: each round adds the candidate that leaves least, until nothing is left or nothing helps.
+    """Add the candidate that leaves least, round by round, until nothing is left or nothing helps.
 
-    problem: the model as given.  names: of the candidates.  Recordings held out decide between rivals, and give
-    parameters that others leave open.
+    Args:
+        problem: the problem of the model as given.
+
+    Returns:
+        The rounds that added an effect, and a last one with the final model.
     """
     rounds: list[Round] = []
     given, null, values, settings = problem, problem.null, problem.values, problem.settings
@@ -106,7 +109,9 @@ def forward_selection(problem: Problem, names: Sequence[str], templates: Templat
 def with_candidates(problem: Problem, here: Problem, names: Sequence[str], templates: Templates, turn: Round) -> Round:
     """The round with its candidates: screened, fitted, confirmed, the chosen one first.
 
-    problem: the model as given.  here: with what was added before the round.
+    Args:
+        problem: the problem of the model as given.
+        here: the problem with the effects of earlier rounds.
     """
     null, seen = here.null, here.seen
     left = [n for n in names if n not in {e.name for e in turn.model.effects}]
@@ -139,6 +144,9 @@ def joined(problem: Problem, rounds: Sequence[Round], chance: float) -> list[Rou
         problem: the model as given, by which all effects are judged together.
         rounds: up to the last, whose best effect was judged by the model that it was added to.
         chance: misfit of noise alone.
+
+    Returns:
+        The rounds, all with the refined errors.
     """
     *before, last = rounds
     best = last.fits[0]
@@ -165,21 +173,29 @@ def joined(problem: Problem, rounds: Sequence[Round], chance: float) -> list[Rou
 
 
 def is_stand_in(problem: Problem, last: Round, best: Fit, chance: float, later: bool) -> bool:
-    """Whether the first effect, or a second bend, removes little and leaves something: it may stand for another."""
+    """Whether the first effect, or a second bend, removes little and leaves something: it may stand for another.
+
+    Args:
+        problem: the model as given.
+        last: the effect's round.
+        best: its fit.
+        chance: misfit of noise alone.
+        later: whether there are effects before it.
+    """
     if later and not is_second_bend(last, best):
         return False
     little = is_small_share(last, best.misfit, chance, later)
     return little and is_significant(problem.null, best.rho, best.prediction)
 
 
-def may_be_refined(problem: Problem, found: Fit, names: Sequence[str]) -> bool:
+def may_be_refined(problem: Problem, fit: Fit, names: Sequence[str]) -> bool:
     """Whether the budget allows the strengths of these effects to be refined: a derivative each, and the last twins."""
-    only, count = simulated_for(problem, found, names)
+    only, count = simulated_for(problem, fit, names)
     cost = len(only) * (PROBES * count * (1 + len(names)) + problem.settings.twins.in_the_end)
     return problem.allows("finer strengths", cost, needed=True)
 
 
 def with_errors(turn: Round, errors: Errors) -> Round:
-    """The round with its effect's errors as they were found last, together with all others."""
+    """The round with its effect's errors from the last joint fit."""
     best = turn.fits[0]
     return replace(turn, fits=(replace(best, sd=no_smaller(errors.get(best.name, {}), best.sd)), *turn.fits[1:]))

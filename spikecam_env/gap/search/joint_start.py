@@ -1,8 +1,8 @@
 """Two effects of which neither shows alone, fitted at once from a grid of starts.
 
-An edge of the array's clock gathers pixels in every row, and is seen as late and early spikes where rows are read at
-its moment: in a static scene a read-out that rolls through the rows shows by the edge alone, and the edge, without it,
-fits few rows.  An effect says which other it starts with, and from which values of their parameters (`start_with`).
+An edge of the array's clock gathers pixels in every row.  It shows as late and early spikes in rows that are read at
+its moment.  In a static scene a rolling read-out shows by the edge alone, and the edge without it fits few rows.  An
+effect declares its partner, and the values of their parameters to start from (`start_with`).
 """
 
 from __future__ import annotations
@@ -32,20 +32,19 @@ DESCENTS = 2
 
 @dataclass(frozen=True)
 class Pair:
-    """`first`, which recordings of their kind show, and `second`, which shows by it alone."""
+    """Two effects: the recordings show `second` only beside `first`."""
 
     first: str
     second: str
 
     @property
     def names(self) -> tuple[str, str]:
-        """Both."""
+        """Names of both."""
         return self.first, self.second
 
 
 def pairs(problem: Problem, names: Collection[str]) -> list[Pair]:
-    """Pairs among the candidates `names` that are to be fitted at once: of scenes that nobody measured, where the
-    second effect does not show without the first."""
+    """Pairs among the candidates to fit at once: in unknown scenes, where the second shows only by the first."""
     if not problem.case.scenes_only:
         return []
     lacking = [n for n in names if LACKING[candidate(n).needs](problem.case.conditions) is not None]
@@ -54,7 +53,7 @@ def pairs(problem: Problem, names: Collection[str]) -> list[Pair]:
 
 def fit_pairs(here: Problem, names: Collection[str]) -> list[Fit]:
     """A fit of each pair, as one of its first effect, whose model has both; those that the budget allows."""
-    return [found for pair in pairs(here, names) if (found := _fit_pair(here, pair)) is not None]
+    return [fit for pair in pairs(here, names) if (fit := _fit_pair(here, pair)) is not None]
 
 
 def _fit_pair(here: Problem, pair: Pair) -> Fit | None:
@@ -76,17 +75,17 @@ def _fit_pair(here: Problem, pair: Pair) -> Fit | None:
         scale, _ = scale_to(here.null, here.seen, predicted)
         scale = float(np.sign(scale) * np.clip(abs(scale), 1 / LARGEST_FACTOR, LARGEST_FACTOR))
         scaled = bounded(pair.first, {**first, strength: first[strength] * scale})
-        predicted, there = with_change_scaled(here.null, predicted, scale), with_effect(model, pair.first, scaled)
+        predicted, model = with_change_scaled(here.null, predicted, scale), with_effect(model, pair.first, scaled)
         rho, left = here.residual_and_misfit(predicted)
         own = {k: scaled[k] for k in fitted}
-        return Fit(pair.first, own, {}, predicted, constrained_refit(there, here.case.base), rho, left, there)
+        return Fit(pair.first, own, {}, predicted, constrained_refit(model, here.case.base), rho, left, model)
 
-    def probe(there: SensorModel, base: BaseFit) -> Prediction:
-        return here.predict(there, constrained_refit(there, base), 1, only)
+    def probe(model: SensorModel, base: BaseFit) -> Prediction:
+        return here.predict(model, constrained_refit(model, base), 1, only)
 
-    def descended(found: Fit) -> Fit:
-        end = descend(here, probe, found.model, found.base, free, COMPARED)
-        return where_ended(here, found, end, free)
+    def descended(fit: Fit) -> Fit:
+        end = descend(here, probe, fit.model, fit.base, free, COMPARED)
+        return where_ended(here, fit, end, free)
 
     with ThreadPoolExecutor(here.case.jobs) as pool:
         best = sorted(pool.map(start, grid), key=lambda f: f.misfit)[:DESCENTS]

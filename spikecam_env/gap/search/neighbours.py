@@ -1,13 +1,13 @@
 """Neighbouring hypotheses, tried where forward selection alone would stay with the first that came.
 
-    another start     try_other_starts             the same effect, from another of its shapes
-    another effect    try_in_place_of_earlier      runners-up of an earlier round, now that a later effect is there
-                      try_in_place_of_last         the runner-up of the last round, beside the same effects
-    one fewer         try_without_earlier          all that was found, without what is no longer needed
-    two at once       try_cancelling_pair          two bends, of which neither is found alone
-    more draws        try_more_draws               the same, where its few twins do not say whether it leaves anything
+    another start     try_other_starts             the same effect, from another of its shapes.
+    another effect    try_in_place_of_earlier      runners-up of an earlier round, beside a later effect.
+                      try_in_place_of_last         the runner-up of the last round, beside the same effects.
+    one fewer         try_without_earlier          all effects but those that are no longer needed.
+    two at once       try_cancelling_pair          two bends, neither of which is found alone.
+    more draws        try_more_draws               the same, where few twins do not show whether it leaves anything.
 
-Each returns what it was given where the neighbour is no better, or the budget does not allow it.
+Each returns its argument where the neighbour is no better, or the budget does not allow it.
 """
 
 from __future__ import annotations
@@ -38,53 +38,63 @@ from spikecam_env.types import Floats
 
 
 def try_other_starts(
-    problem: Problem, found: Fit, before: float, screened: Sequence[Screened], tries: Mapping[Screened, Fit]
+    problem: Problem, fitted: Fit, before: float, screened: Sequence[Screened], tries: Mapping[Screened, Fit]
 ) -> list[Fit]:
     """Fit a candidate from other starts than that of its best fit, and its shape from the best of them.
 
     Args:
-        found: its best fit.
+        fitted: its best fit.
         before: misfit without it.
         screened: all starts, the best first.
         tries: fits that were made from starts before.
 
     Returns:
-        The shaped fit, if one of the starts removes nearly as much as `found` does; else nothing.
+        The shaped fit, if one of the starts removes nearly as much as `fitted` does; else nothing.
     """
-    began = min((s for s in tries if s.name == found.name), key=lambda s: tries[s].misfit)
+    began = min((s for s in tries if s.name == fitted.name), key=lambda s: tries[s].misfit)
     starts = other_starts(began, screened, before, WORTH)
-    cost = recordings_of(problem, found) * sum(s not in tries for s in starts)
-    if not starts or not problem.allows(f"{found.name} of another shape", cost):
+    cost = recordings_of(problem, fitted) * sum(s not in tries for s in starts)
+    if not starts or not problem.allows(f"{fitted.name} of another shape", cost):
         return []
     with ThreadPoolExecutor(problem.case.jobs) as pool:
         new = [s for s in starts if s not in tries]
         fits = {**tries, **dict(zip(new, pool.map(partial(fit_from, problem), new), strict=True))}
-    near = [fits[s] for s in starts if before - fits[s].misfit > SAME_SHARE * (before - found.misfit)]
+    near = [fits[s] for s in starts if before - fits[s].misfit > SAME_SHARE * (before - fitted.misfit)]
     best = [f for f in sorted(near, key=lambda f: f.misfit)[:1] if may_be_shaped(problem, f)]
     return [with_fitted_shapes(problem, f) for f in best]
 
 
 def other_starts(began: Screened, screened: Sequence[Screened], before: float, worth: float) -> list[Screened]:
-    """Where else to fit a candidate from, whose shape is fitted too: a valley may have two ends.
+    """Other starts for a candidate whose shape is fitted too: a valley may have two ends.
 
-    Those of its templates, but for where the best fit began, that explain enough of what the best of them does; all
-    where templates are of other pictures.  before: misfit of none.  worth: the share that is enough.
+    Its other templates that explain a share `worth` of its best one; all of them where templates are of other pictures.
+
+    Args:
+        began: the start of its best fit.
+        screened: all starts, the best first.
+        before: misfit without it.
+        worth: the share that is enough.
     """
-    what = candidate(began.name)
-    if not set(what.shapes) & set(what.fitted):
+    effect = candidate(began.name)
+    if not set(effect.shapes) & set(effect.fitted):
         return []
-    there = [s for s in screened if s.name == began.name]
-    enough = worth * (before - there[0].misfit)
-    return [s for s in there if s is not began and (what.of_motion or before - s.misfit > enough)]
+    own = [s for s in screened if s.name == began.name]
+    enough = worth * (before - own[0].misfit)
+    return [s for s in own if s is not began and (effect.of_motion or before - s.misfit > enough)]
 
 
-# ---- another effect in place of one that was found
+# ---- another effect in place of an earlier one
 
 
 def try_in_place_of_earlier(problem: Problem, best: Fit, turn: Round) -> tuple[Fit, Round]:
     """Compare the effect of an earlier round with its runners-up again, beside the effect that was found later.
 
     Alone, a wrong effect may have stood for both.
+
+    Args:
+        problem: the model as given.
+        best: the fit of all effects.
+        turn: the earlier round.
 
     Returns:
         (the fit of all effects, the earlier round), with the effect that is better now.
@@ -117,9 +127,9 @@ def try_in_place_of_last(problem: Problem, last: Round, errors: Errors, names: S
     """Try the runner-up of the last round in place of its best, all parameters refined together.
 
     Args:
-        last: the round.
+        problem: the model as given.
         errors: of all parameters, beside the best.
-        names: of all effects found, the round's last.
+        names: names of all effects, the round's last.
 
     Returns:
         (round, errors): with the runner-up if it leaves less misfit by more than a tie, else as given.
@@ -136,14 +146,18 @@ def try_in_place_of_last(problem: Problem, last: Round, errors: Errors, names: S
 
 
 def runner_up(turn: Round, names: Sequence[str], same_share: float) -> list[Fit]:
-    """The runner-up of a round beside the same effects, at most one, where it removed a large share of what the best
-    did: those before it may have had its share when the two were compared.
+    """The runner-up of a round beside the same effects, at most one.
 
-    names: of all effects found, the round's last.  same_share: the share that it has to have removed."""
+    Earlier effects may have taken its share when the two were compared.
+
+    Args:
+        names: names of all effects, the round's last.
+        same_share: share of the best's misfit that it has to have removed.
+    """
     best, *others = turn.fits
     least = turn.misfit - same_share * (turn.misfit - best.misfit)
-    there = [f for f in others if len(f.prediction.draws) > 1 and f.misfit < least and f.name not in names]
-    beside = [f for f in there if {e.name for e in f.model.effects} - {f.name} >= set(names[:-1])]
+    near = [f for f in others if len(f.prediction.draws) > 1 and f.misfit < least and f.name not in names]
+    beside = [f for f in near if {e.name for e in f.model.effects} - {f.name} >= set(names[:-1])]
     return sorted(beside, key=lambda f: f.misfit)[:1]
 
 
@@ -156,19 +170,19 @@ def may_try_without_earlier(problem: Problem, count: int) -> bool:
     return problem.allows("a test of each effect found", cost, needed=True)
 
 
-def try_without_earlier(problem: Problem, found: Fit, earlier: Mapping[str, Floats]) -> Fit:
+def try_without_earlier(problem: Problem, fitted: Fit, earlier: Mapping[str, Floats]) -> Fit:
     """All effects found so far together, without those that are no longer needed.
 
-    Errors stay as large as the many twins of `found` have shown them: two twins may scatter little by chance.
+    Errors stay as large as the many twins of `fitted` have shown them: two twins may scatter little by chance.
 
     Args:
         problem: before any effect was added.
-        found: the fit of all effects.
-        earlier: (S,) what each effect changed when it was added, by name.  An effect whose change is plainly missed is
+        fitted: the fit of all effects.
+        earlier: (S,) change by each effect when it was added, by name.  An effect whose change is plainly missed is
             kept without a simulation.
     """
-    both = confirmed(problem, resettled(problem, found, found.model))
-    both = no_more_certain(problem, both, found.prediction)
+    both = confirmed(problem, resettled(problem, fitted, fitted.model))
+    both = no_more_certain(problem, both, fitted.prediction)
     for name, change in earlier.items():
         if name not in {e.name for e in both.model.effects} or is_missed(problem, both, change):
             continue
@@ -178,10 +192,10 @@ def try_without_earlier(problem: Problem, found: Fit, earlier: Mapping[str, Floa
     return both
 
 
-def is_missed(problem: Problem, found: Fit, change: Floats) -> bool:
+def is_missed(problem: Problem, fitted: Fit, change: Floats) -> bool:
     """Whether a prediction without a change (S,) leaves so much more misfit that no simulation is needed."""
-    without = replace(found.prediction, mean=found.prediction.mean - change)
-    return problem.misfit(without) > found.misfit + problem.settings.deviance.keep_untried
+    without = replace(fitted.prediction, mean=fitted.prediction.mean - change)
+    return problem.misfit(without) > fitted.misfit + problem.settings.deviance.keep_untried
 
 
 # ---- two effects at once
@@ -190,9 +204,11 @@ def is_missed(problem: Problem, found: Fit, change: Floats) -> bool:
 def try_cancelling_pair(problem: Problem, names: Sequence[str], rounds: list[Round]) -> list[Round]:
     """Try two bends that cancel, if the search began with a bend and leaves something.
 
+    Args:
+        problem: the model as given.
+
     Returns:
-        Rounds that find the two, if they leave less misfit than the search by what an effect has to remove; else the
-        rounds of the search.
+        Rounds that find the two, if they leave less misfit than the search by `Deviance.accept`; else `rounds`.
     """
     first, last = rounds[0], rounds[-1]
     null = problem.null
@@ -202,19 +218,19 @@ def try_cancelling_pair(problem: Problem, names: Sequence[str], rounds: list[Rou
         return rounds
     if not problem.allows("two nonlinearities that cancel", needed=True):
         return rounds
-    found = fit_pair(problem, names)
-    if found is None or found.misfit > last.misfit:
+    fitted = fit_pair(problem, names)
+    if fitted is None or fitted.misfit > last.misfit:
         return rounds
-    found, errors, used_held_out = refined_together(problem, found, PAIR)
-    if found.misfit > last.misfit - problem.settings.deviance.accept:
+    fitted, errors, used_held_out = refined_together(problem, fitted, PAIR)
+    if fitted.misfit > last.misfit - problem.settings.deviance.accept:
         return rounds
-    one, other = (next(e for e in found.model.effects if e.name == name).parameters() for name in PAIR)
-    alone = replace(found, name=PAIR[0], parameters={"tau_us": one["tau_us"]}, sd=errors[PAIR[0]])
-    found = replace(found, parameters={"beta": other["beta"]}, sd=errors[PAIR[1]])
+    one, other = (next(e for e in fitted.model.effects if e.name == name).parameters() for name in PAIR)
+    alone = replace(fitted, name=PAIR[0], parameters={"tau_us": one["tau_us"]}, sd=errors[PAIR[0]])
+    fitted = replace(fitted, parameters={"beta": other["beta"]}, sd=errors[PAIR[1]])
     between = replace(
         first,
-        model=found.model.without(PAIR[1]),
-        fits=(found,),
+        model=fitted.model.without(PAIR[1]),
+        fits=(fitted,),
         rivals=(),
         used_held_out=used_held_out,
         motion_alone=any(r.motion_alone for r in rounds),
@@ -223,30 +239,33 @@ def try_cancelling_pair(problem: Problem, names: Sequence[str], rounds: list[Rou
     return [
         replace(first, fits=(alone, *rest), rivals=()),
         between,
-        Round(found.model, found.base, found.prediction, found.rho, found.misfit),
+        Round(fitted.model, fitted.base, fitted.prediction, fitted.rho, fitted.misfit),
     ]
 
 
 # ---- more draws of the same
 
 
-def try_more_draws(problem: Problem, found: Fit) -> Fit:
+def try_more_draws(problem: Problem, fitted: Fit) -> Fit:
     """The fit by more draws, if its few twins do not show whether it leaves anything.
 
-    It gets as many draws as the null model has, and ten times as many units if it leaves something of the pattern."""
+    It gets as many draws as the null model has, and ten times as many units if it leaves something of the pattern.
+    """
     null, many = problem.null, 10 * problem.settings.twins.drawn_units
-    pattern = found.prediction.units is not None and is_significant(null, of_pattern(problem, found), found.prediction)
+    pattern = fitted.prediction.units is not None and is_significant(
+        null, of_pattern(problem, fitted), fitted.prediction
+    )
     if pattern:
-        found = with_prediction(problem, found, problem.with_pattern(found.model, found.prediction, many))
-    left = [residual(null, measured, found.prediction) for measured in (problem.seen, problem.values)]
-    if not any(is_significant(null, rho) and not is_significant(null, rho, found.prediction) for rho in left):
-        return found
-    more = confirmed(problem, found, len(null.draws)).prediction
-    more = problem.with_pattern(found.model, more, many) if pattern else more
-    return with_prediction(problem, found, replace(more, error=np.maximum(more.error, found.prediction.error)))
+        fitted = with_prediction(problem, fitted, problem.with_pattern(fitted.model, fitted.prediction, many))
+    left = [residual(null, measured, fitted.prediction) for measured in (problem.seen, problem.values)]
+    if not any(is_significant(null, rho) and not is_significant(null, rho, fitted.prediction) for rho in left):
+        return fitted
+    more = confirmed(problem, fitted, len(null.draws)).prediction
+    more = problem.with_pattern(fitted.model, more, many) if pattern else more
+    return with_prediction(problem, fitted, replace(more, error=np.maximum(more.error, fitted.prediction.error)))
 
 
-def of_pattern(problem: Problem, found: Fit) -> Floats:
-    """(S,) what a fit leaves of the pattern, of all recordings, in noise; 0 elsewhere."""
-    there = np.array([k.group == "pattern" for k in problem.null.keys])
-    return np.where(there, residual(problem.null, problem.values, found.prediction), 0.0)
+def of_pattern(problem: Problem, fitted: Fit) -> Floats:
+    """(S,) residuals of the pattern in all recordings, in noise; 0 elsewhere."""
+    is_pattern = np.array([k.group == "pattern" for k in problem.null.keys])
+    return np.where(is_pattern, residual(problem.null, problem.values, fitted.prediction), 0.0)

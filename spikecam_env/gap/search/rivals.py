@@ -1,7 +1,7 @@
 """Whether a measurement distinguishes one candidate from another.
 
-Had the other been true, would the first have looked as much better as it does?  The noise of the null's own draws, on
-top of what the other predicts, makes campaigns in which it is true: they say what lead of the first over it is chance.
+Had the other been true, would the first have looked as much better as it does?  The noise of the null's own draws,
+added to the other's prediction, makes campaigns in which the other is true.  They show which lead is chance.
 """
 
 from __future__ import annotations
@@ -24,11 +24,11 @@ def is_rival(null: Null, draws: Sequence[Draw], measured: Floats, best: Predicti
     It does if the lead of the best is larger than chance makes it in campaigns in which the other is true.
 
     Args:
-        null: what both were added to.
+        null: the null model, to which both were added.
         draws: campaigns of the model as given; their noise is made as large as that of `null`.
         measured: (S,) statistics, NaN where they take no part.
-        best: what the best candidate predicts.
-        other: what the other predicts.
+        best: prediction of the best candidate.
+        other: prediction of the other.
     """
     observed = lead(null, measured, best, other)
     if observed < null.settings.deviance.tie:
@@ -47,9 +47,13 @@ def is_rival(null: Null, draws: Sequence[Draw], measured: Floats, best: Predicti
 
 
 def most_likely(null: Null, best: Prediction, other: Prediction) -> tuple[Floats, Floats]:
-    """What a candidate most likely gives: where its twins do not clearly differ from the best's, the mean of both.
+    """The most likely statistics of a candidate: the mean of both where its twins do not differ from the best's.
 
     Otherwise the chance of its few twins would count as its law.
+
+    Args:
+        best: prediction of the best candidate.
+        other: prediction of the other.
 
     Returns:
         ((S,) mean, (S,) its variance).
@@ -65,7 +69,13 @@ def lead(null: Null, seen: Floats, best: Prediction, other: Prediction) -> float
     """Misfit by which `best` is better than `other`, each at the strength that suits `seen` (S,) best.
 
     Both are judged in the mean of their noises.  Two twins of each do not show which one's campaigns scatter more, and
-    the logarithm of the variance would decide."""
+    the logarithm of the variance would decide.
+
+    Args:
+        seen: (S,) statistics.
+        best: prediction of one candidate.
+        other: prediction of the other.
+    """
     both = [rescaled(null, seen, p) for p in (other, best)]
     spread = np.sqrt(np.mean([p.spread**2 for p in both], axis=0))
     left = [residual_and_misfit(null, seen, replace(p, spread=spread))[1] for p in both]
@@ -73,5 +83,5 @@ def lead(null: Null, seen: Floats, best: Prediction, other: Prediction) -> float
 
 
 def rescaled(null: Null, seen: Floats, predicted: Prediction) -> Prediction:
-    """A prediction with its change from the null scaled to come nearest to what is seen."""
+    """A prediction with its change from the null scaled to come nearest to the statistics `seen` (S,)."""
     return with_change_scaled(null, predicted, scale_to(null, seen, predicted)[0])

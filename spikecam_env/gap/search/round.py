@@ -1,4 +1,4 @@
-"""One round of the search, and what decides whether the next one begins."""
+"""One round of the search, and the rules by which the next one begins."""
 
 from __future__ import annotations
 
@@ -30,70 +30,79 @@ LEAST_CHANGE = 2.0
 
 @dataclass(frozen=True)
 class Round:
-    """One turn of the search: the model it started from, what that left, and the candidates that were fitted.
-
-    rivals: names that may as well be true as the best of them.
-    used_held_out: whether recordings held out were needed for parameters too.
-    motion_alone: whether what moves among these was fitted, since nothing else disagreed any more.
-    to_join: misfit that its effect has to remove to be fitted together with what was found.
-    """
+    """One turn of the search."""
 
     model: SensorModel
+    """The model it started from."""
     base: BaseFit
+    """The unit under `model`."""
     prediction: Prediction
+    """The prediction of `model`."""
     rho: Floats
+    """(S,) residuals of `model`, in noise."""
     misfit: float
+    """Misfit of `model`."""
     fits: tuple[Fit, ...] = ()
+    """The candidates that were fitted, the chosen one first."""
     rivals: tuple[str, ...] = ()
+    """Names that may as well be true as the chosen one."""
     used_held_out: bool = False
+    """Whether held-out recordings were needed for parameters too."""
     motion_alone: bool = False
+    """Whether held-out recordings in motion were fitted, since nothing else disagreed any more."""
     to_join: float = Deviance().accept
+    """Misfit that its effect has to remove to be fitted together with the earlier ones."""
 
 
 def has_candidate(turn: Round, here: Null) -> bool:
-    """Whether a round's best is to be fitted together with what was found.  here: what the round stands on."""
+    """Whether a round's best is to be fitted together with the earlier effects; here: the null model with those."""
     best = turn.fits[0]
     least = here.settings.deviance.accept if is_second_bend(turn, best) else turn.to_join
     return turn.misfit - best.misfit >= least and is_visible(here, best)
 
 
-def is_second_bend(turn: Round, found: Fit) -> bool:
+def is_second_bend(turn: Round, fitted: Fit) -> bool:
     """Whether a fit bends the rate curve beside an effect that bends it too.
 
-    A bend fits the error of another, so it has to remove as much misfit as a first effect."""
-    return candidate(found.name).bends_response and any(candidate(e.name).bends_response for e in turn.model.effects)
+    A bend fits the error of another, so it has to remove as much misfit as a first effect.
+    """
+    return candidate(fitted.name).bends_response and any(candidate(e.name).bends_response for e in turn.model.effects)
 
 
-def is_visible(here: Null, found: Fit) -> bool:
+def is_visible(here: Null, fitted: Fit) -> bool:
     """Whether an effect changes the mean or the scatter of a statistic clearly.
 
-    Scatter counts since a few hot pixels are in some units only.  An effect of random course is always visible."""
-    there = found.prediction
-    change = np.hypot(there.mean - here.mean, np.sqrt(np.maximum(there.spread**2 - here.sd**2, 0.0))) / here.noise
-    return candidate(found.name).random_course or bool(change.max() > LEAST_CHANGE)
+    Scatter counts since a few hot pixels are in some units only.  An effect of random course is always visible.
+
+    Args:
+        here: the null model.
+        fitted: the fit of the effect.
+    """
+    after = fitted.prediction
+    change = np.hypot(after.mean - here.mean, np.sqrt(np.maximum(after.spread**2 - here.sd**2, 0.0))) / here.noise
+    return candidate(fitted.name).random_course or bool(change.max() > LEAST_CHANGE)
 
 
 def absent(case: Case, given: SensorModel, model: SensorModel) -> set[str]:
-    """Effects that a model has beside the one given, and that do nothing: of no strength, or of too few events."""
+    """Added effects that do nothing: of strength 0, or of too few events."""
     has = {e.name for e in given.effects}
-    there = {e.name: e.parameters() for e in model.effects if e.name not in has}
+    added = {e.name: e.parameters() for e in model.effects if e.name not in has}
     return {
         name
-        for name, parameters in there.items()
+        for name, parameters in added.items()
         if parameters[candidate(name).strength] == 0
         or expected_events(name, parameters, case.conditions, case.observations) < LEAST_EVENTS
     }
 
 
 def is_improvement(null: Null, before: float, best: Fit, later: bool, weak: bool = False) -> bool:
-    """Whether a fit of all that was found together is an improvement: it leaves less misfit by what an effect has to
-    remove.
+    """Whether a joint fit of all effects is an improvement: it leaves less misfit by `Deviance.accept`.
 
     Args:
-        before: misfit without the newest effect, which is known to some ten: other twins say each time how widely
-            effects scatter.
-        later: whether there were effects before.  Such a fit that leaves nothing significant has but to leave no more.
-        weak: whether the newest effect removed less by itself than is asked.  Such a fit has to leave nothing.
+        before: misfit without the newest effect, which other twins would change by some ten.
+        best: the joint fit.
+        later: whether there were effects before.  Such a fit, where it leaves nothing significant, may leave as much.
+        weak: whether the newest effect removed less than `Deviance.accept` by itself.  Such a fit has to leave nothing.
     """
     explained = later and not is_significant(null, best.rho, best.prediction)
     if weak and not explained:
@@ -102,8 +111,12 @@ def is_improvement(null: Null, before: float, best: Fit, later: bool, weak: bool
 
 
 def is_small_share(turn: Round, left: float, chance: float, later: bool) -> bool:
-    """Whether a misfit `left` is little less than what a round started from: a stand-in's.
+    """Whether a misfit is little less than at the start of a round, as a stand-in's is.
 
-    chance: misfit of noise alone.  later: whether effects were found before."""
+    Args:
+        left: the misfit.
+        chance: misfit of noise alone.
+        later: whether there are earlier effects.
+    """
     least = WORTH if later else 1 - SAME_SHARE
     return turn.misfit - left < least * (turn.misfit - chance)

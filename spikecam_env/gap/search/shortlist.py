@@ -45,13 +45,17 @@ def line_of(case: Case) -> float | None:
 def screened_beside(here: Problem, names: Sequence[str], templates: Templates) -> list[Screened]:
     """Candidates by the misfit that their templates leave, the best first.
 
-    Candidates that act through an effect of the model get templates that are simulated on this campaign."""
+    Candidates that act through an effect of the model get templates that are simulated on this campaign.
+
+    Args:
+        here: the problem, with the effects before.
+    """
     null, shown = here.null, here.case.conditions
-    found = screen(templates, shown, null, here.seen, names, line_of(here.case))
+    screened = screen(templates, shown, null, here.seen, names, line_of(here.case))
     if through := acting_through(names, here.model, shown):
         own = own_templates(here.case, here.model, null, through)
-        found = sorted([*found, *screen(own, shown, null, here.seen, through)], key=lambda s: s.misfit)
-    return found
+        screened = sorted([*screened, *screen(own, shown, null, here.seen, through)], key=lambda s: s.misfit)
+    return screened
 
 
 def best_of_each(screened: Sequence[Screened]) -> list[Screened]:
@@ -62,18 +66,18 @@ def best_of_each(screened: Sequence[Screened]) -> list[Screened]:
 def starts_to_fit(
     shapes: Sequence[Screened], before: float, searching: Searching, groups: Collection[str] = ()
 ) -> list[Screened]:
-    """Which candidates to fit, and from where: the best by their templates.
+    """The candidates to fit, and their starts: the best by their templates.
 
-    Those are `FEWEST_FITTED`, and up to `most_fitted` if they explain enough of what the best explains.  A candidate
-    that takes several twins a try has to explain enough in any case.
+    Those are `fewest_fitted`, and up to `most_fitted` if they explain a share (`worth`) of the best.  A candidate that
+    takes several twins a try has to explain that share in any case.
 
     Args:
         shapes: candidates by their templates of each shape, the best first.
-        before: misfit of none.
+        before: misfit without any.
         searching: how many are fitted.
-        groups: of statistics that stand out.  If the pattern does, all candidates that only change it are fitted too:
-            its statistics are not in proportion to their strength.  If motion does, all that show by it alone are, in
-            every shape: templates are of other pictures.
+        groups: groups of statistics that stand out.  If the pattern does, all candidates that only change it are
+            fitted too: its statistics are not in proportion to their strength.  If motion does, all that show by it
+            alone are, in every shape: templates are of other pictures.
     """
     screened = best_of_each(shapes)
     if not screened:
@@ -94,14 +98,21 @@ def takes_several_twins(name: str) -> bool:
 
 
 def groups_that_stand_out(null: Null, distance: Floats) -> set[str]:
-    """Groups of which a statistic stands out by itself, or is what stands out most.  distance: (S,) in noise."""
+    """Groups with a statistic that stands out by itself, or with the largest distance (S,), in noise."""
     least = min(SHOWS, float(np.abs(distance).max()))
     return {k.group for k, d in zip(null.keys, distance, strict=True) if abs(d) >= least}
 
 
 def fits_of(problem: Problem, before: float, starts: Sequence[Screened]) -> tuple[list[Fit], dict[Screened, Fit]]:
-    """(candidates fitted from where their templates say, each from the best of its starts; the fit from each start).
-    before: misfit of none."""
+    """Fit candidates from their starts.
+
+    Args:
+        before: misfit without any.
+        starts: starts by templates, several for a candidate.
+
+    Returns:
+        (the best fit of each candidate, the fit from each start).
+    """
     with ThreadPoolExecutor(problem.case.jobs) as pool:
         tries = dict(zip(starts, pool.map(partial(fit_from, problem), starts), strict=True))
         names = dict.fromkeys(s.name for s in starts)
@@ -112,17 +123,17 @@ def fits_of(problem: Problem, before: float, starts: Sequence[Screened]) -> tupl
 
 
 def fit_from(problem: Problem, start: Screened) -> Fit:
-    """A candidate's strength, fitted from where its template says."""
+    """A candidate's strength, fitted from its template."""
     return fit(problem, start.name, start.start, start.expected, start.white)
 
 
-def may_be_shaped(problem: Problem, found: Fit) -> bool:
+def may_be_shaped(problem: Problem, fitted: Fit) -> bool:
     """Whether the budget allows a fit's other parameters: a derivative each, and a start."""
-    cost = recordings_of(problem, found) * (1 + len(candidate(found.name).fitted))
-    return problem.allows(f"{found.name} of finer shape", cost, needed=True)
+    cost = recordings_of(problem, fitted) * (1 + len(candidate(fitted.name).fitted))
+    return problem.allows(f"{fitted.name} of finer shape", cost, needed=True)
 
 
-def recordings_of(problem: Problem, found: Fit) -> int:
+def recordings_of(problem: Problem, fitted: Fit) -> int:
     """Recordings that one prediction of a candidate simulates."""
-    only = problem.affected([found.name], found.prediction.mean - problem.null.mean)
-    return len(only) * twins_of(found.name)
+    only = problem.affected([fitted.name], fitted.prediction.mean - problem.null.mean)
+    return len(only) * twins_of(fitted.name)

@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from spikecam_env.calibration.real import ideal_second_difference
+from spikecam_env.calibration.spike_times import ideal_second_difference
 from spikecam_env.gap.observe.bit_passes import BESIDE_WHOLE
 from spikecam_env.gap.observe.observation import DIFFERENCES, ObservedRecording
 from spikecam_env.gap.statistics.reading import CampaignReading, root

@@ -2,9 +2,9 @@
 
     L(x, y) = (rate(x, y) - dark(x, y)) / gain(x, y)        under the unit and the model to be tested
 
-Rates then say nothing, and the test is of the times of spikes: noise, neighbours, rows, drift, lines.  Every twin
-draws rates anew within their errors (`calibration.real.plausible_rates`).  Where a model bends the response, light is
-corrected until the rates come out.
+Rates then say nothing; what is left to test is when spikes come: noise, neighbours, rows, drift, lines.  Every twin
+draws rates anew that agree with the recording (`calibration.spike_times.plausible_rates`), and where a model bends the
+response, light is corrected until the rates come out.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from spikecam_env.calibration.real import plausible_rates
+from spikecam_env.calibration.spike_times import plausible_rates
 from spikecam_env.gap.observe.conditions import Condition
 from spikecam_env.gap.observe.observation import ObservedRecording
 from spikecam_env.gap.twins.simulate import simulate

@@ -1,1 +1,1 @@
-"""From a search to a verdict: what is named, what is left and where, and bounds on what was not found."""
+"""From a search to a verdict: named effects, the remainder and its place, and bounds on other effects."""

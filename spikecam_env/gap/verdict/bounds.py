@@ -1,4 +1,4 @@
-"""Upper bounds: strengths of an effect that were simulated on the campaign at hand, and that it refutes.
+"""Upper bounds: strengths of an effect that the campaign at hand refutes, by simulation.
 
 A strength is refuted where 95 of 100 campaigns with the effect would score higher (`score`) than the measurement did.
 The least that is refuted is the bound.
@@ -45,7 +45,7 @@ LARGEST_SCALING = 40.0
 
 LONGER_RECORDINGS = "longer recordings, or more of them; in these it hardly shows"
 MORE_EFFORT = "a larger --effort: the budget was spent"
-"""What is needed for a bound."""
+"""Needed for a bound."""
 
 
 def bounds(
@@ -57,15 +57,14 @@ def bounds(
     of its size.
 
     Args:
-        case: the campaign.
-        model: that explains it.
-        null: what that predicts.
+        model: the model that explains it.
+        null: the prediction of that model.
         measured: (S,) statistics.
-        names: of the effects.
+        names: names of the effects.
         templates: strengths to begin from.
 
     Returns:
-        (bounds; names of effects without a bound, each with what would give one).
+        (bounds; names of effects without a bound, each with the means to get one).
     """
     if case.scenes_only:
         case = replace(case, base=unit_under(case, model))
@@ -83,9 +82,9 @@ def bounds(
     with ThreadPoolExecutor(case.jobs) as pool:
         shapes = list(pool.map(scored, starts))
         worst = [max((k for k in shapes if k.probe.name == name), key=lambda k: k.expected) for name in by_name]
-        found = list(pool.map(partial(bound_of, measured), worst))
-    kept = [bound for bound in found if isinstance(bound, Bound)]
-    return sorted(kept, key=lambda b: b.name), sorted(b for b in found if not isinstance(b, Bound))
+        each = list(pool.map(partial(bound_of, measured), worst))
+    known = [bound for bound in each if isinstance(bound, Bound)]
+    return sorted(known, key=lambda b: b.name), sorted(b for b in each if not isinstance(b, Bound))
 
 
 def _both_signs(name: str, parameters: Parameters) -> list[Parameters]:
@@ -95,15 +94,13 @@ def _both_signs(name: str, parameters: Parameters) -> list[Parameters]:
 
 @dataclass(frozen=True)
 class ScoredShape:
-    """A candidate of one shape, as it was looked at.  score: None where it does not show.
-
-    excess: what the measurement scores beyond what is usual without the effect; 0 where that is less, since a campaign
-    that happens to score little makes no bound smaller.
-    """
+    """A candidate of one shape with its score."""
 
     probe: TwinProbe | UnitProbe
     score: Score | None
+    """None where the effect does not show."""
     excess: float
+    """Score of the measurement less the mean score without the effect, at least 0: chance makes no bound smaller."""
 
     @property
     def expected(self) -> float:
@@ -133,12 +130,12 @@ def scored_shape(probe: TwinProbe | UnitProbe, measured: Floats, start: Paramete
 
 
 def excess_of(score: Score | None, measured: Floats) -> float:
-    """What a measurement scores beyond what is usual, at least 0."""
+    """Score of a measurement less the mean score without the effect, at least 0."""
     return max(score.of(measured) - score.mean, 0.0) if score else 0.0
 
 
 def bound_of(measured: Floats, shape: ScoredShape) -> Bound | tuple[str, str]:
-    """The least refuted strength above which no tested strength is open; without one the name, with what is needed."""
+    """The least refuted strength above which no tested strength is open; without one (name, the means to get one)."""
     probe, name, key = shape.probe, shape.probe.name, strength_of(shape.probe.name)
     resolution = probe.settings.bounding.resolution
     if shape.score is None or not np.isfinite(shape.expected) or probe.events(shape.score.parameters) <= 0:
@@ -171,9 +168,10 @@ def bound_of(measured: Floats, shape: ScoredShape) -> Bound | tuple[str, str]:
 
 
 def first_strength(shape: ScoredShape) -> Parameters:
-    """The parameters at a strength that is likely to be refuted: above where the bound is expected.
+    """The parameters at a strength that is likely to be refuted, above the expected bound.
 
-    Counted things are expected at least twice RULE_OF_THREE times there, if their number grows with the strength."""
+    At least twice RULE_OF_THREE events are expected at it, if their number grows with the strength.
+    """
     assert shape.score is not None
     name, key, at = shape.probe.name, strength_of(shape.probe.name), dict(shape.score.parameters)
     at[key] *= OVERSHOOT * shape.expected / abs(at[key])

@@ -1,4 +1,4 @@
-"""A measurement beside a model, before any search: what the rooms up to the baseline hand to those after them."""
+"""A measurement beside a model, before any search: the result of the stages up to the baseline."""
 
 from __future__ import annotations
 
@@ -20,25 +20,30 @@ from spikecam_env.types import Floats
 
 @dataclass(frozen=True)
 class Comparison:
-    """case: the measurement.  tested: the model under test.  model: the null model, which is the tested one with what
-    the refit found missing.
-
-    null: the null model's prediction of the statistics.  values: (S,) as measured.  given: (S,) as the tested model
-    predicts them.  missing, off, contradictions: found by refit and audit, without a search.  names: of candidates
-    that these recordings can show; not_testable: of the others, with what they need.
-    """
+    """A measurement beside the null model."""
 
     case: Case
+    """The measurement."""
     tested: SensorModel
+    """The model under test."""
     model: SensorModel
+    """The null model: the tested one with the effects that the refit showed to be missing."""
     null: Null
+    """The null model's prediction of the statistics."""
     values: Floats
+    """(S,) measured statistics."""
     given: Floats
+    """(S,) predictions of the tested model."""
     missing: tuple[Missing, ...]
+    """Effects of the base pixel that the refit shows and the tested model lacks."""
     off: OffNominal
+    """Parameters of the tested model that the unit has in another amount."""
     contradictions: tuple[Contradiction, ...]
+    """Labels that contradict the recordings."""
     names: tuple[str, ...] = ()
+    """Candidates that these recordings can show."""
     not_testable: tuple[tuple[str, str], ...] = ()
+    """Names of the others, each with the recording that it needs."""
 
     @property
     def residuals(self) -> Floats:
@@ -47,14 +52,14 @@ class Comparison:
 
     @property
     def disagrees(self) -> bool:
-        """Whether the recordings to fit, or all together, are not what the null model gives."""
+        """Whether the null model disagrees with the recordings to fit, or with all together."""
         return is_discrepant(self.null, values_to_fit(self.case, self.null, self.values)) or is_discrepant(
             self.null, self.values
         )
 
     @property
     def smallest_p(self) -> float:
-        """Of all statistics against the null model, adjusted for their number."""
+        """Smallest p of all statistics against the null model, adjusted for their number."""
         return float(adjusted(deviates(self.null, self.values)).min())
 
 

@@ -1,4 +1,4 @@
-"""The gap: mean square distance of held-out statistics from a model, in noise, and what chance alone makes of it."""
+"""The gap: mean square distance of held-out statistics from a model, in noise, and its floor by chance alone."""
 
 from __future__ import annotations
 
@@ -11,7 +11,14 @@ from spikecam_env.types import Floats
 
 
 def gap_of(case: Case, null: Null, values: Floats, given: Floats, after: Prediction, floor: float = CHANCE) -> Gap:
-    """The gap of the model as given, whose predictions are (S,) `given`, and of one after; each in its own noise."""
+    """The gap of the model as given, and of the model with the effects; each in its own noise.
+
+    Args:
+        values: (S,) measured statistics.
+        given: (S,) predictions of the model as given.
+        after: prediction of the model with the effects.
+        floor: gap by chance.
+    """
     held = case.held_out(null.keys)
     wider = np.sqrt(np.maximum(after.spread**2 - null.sd**2, 0.0) + null.noise**2)
     b, a = (np.nan_to_num((values - mean) / sd) ** 2 for mean, sd in ((given, null.noise), (after.mean, wider)))
@@ -24,9 +31,8 @@ def gap_of(case: Case, null: Null, values: Floats, given: Floats, after: Predict
 
 
 def usable_floor(halves: float) -> float:
-    """The floor of a gap, from that of two halves (`halves_floor.floor_of_halves`), which is NaN where not known.
+    """The floor of a gap by two halves (`halves_floor.floor_of_halves`, NaN where not known), at most that of chance.
 
-    At most that of chance: where halves differ by more, the camera changes with time, and the floor would hold what is
-    to be found.
+    Where halves differ by more, the camera changes with time, and the floor would contain the effect.
     """
     return min(halves, CHANCE) if np.isfinite(halves) else CHANCE

@@ -1,4 +1,4 @@
-"""The verdict on recordings that are said to be static and are not, and what a user does about it."""
+"""The verdict on recordings of wrong labels, said to be static and in motion, and the way on."""
 
 from __future__ import annotations
 

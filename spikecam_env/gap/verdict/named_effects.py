@@ -21,7 +21,7 @@ from spikecam_env.sensor import SensorModel
 
 
 def patched_model(comparison: Comparison, rounds: Sequence[Round]) -> SensorModel:
-    """The model in which a search ended, without effects that do nothing there: beside the others they faded."""
+    """The last model of a search, without effects that do nothing beside the others."""
     if not rounds:
         return comparison.model
     last = rounds[-1].model
@@ -32,29 +32,37 @@ def kept(comparison: Comparison, rounds: Sequence[Round]) -> list[tuple[Fit, Rou
     """The best of each round whose effect is in the last model, with its parameters there, and the round."""
     last = {e.name: e.parameters() for e in patched_model(comparison, rounds).effects}
     added = [r for r, after in itertools.pairwise(rounds) if after.model is not r.model]
-    found = [(r.fits[0], r) for r in added if r.fits[0].name in last]
-    return [(replace(f, parameters={k: last[f.name][k] for k in f.parameters}), r) for f, r in found]
+    best = [(r.fits[0], r) for r in added if r.fits[0].name in last]
+    return [(replace(f, parameters={k: last[f.name][k] for k in f.parameters}), r) for f, r in best]
 
 
-def named_by_refit(found: Missing) -> NamedEffect:
+def named_by_refit(missing: Missing) -> NamedEffect:
     """An effect of the base pixel, as the refit measured it."""
-    effect = found.effect
+    effect = missing.effect
     key = type(effect).strength
-    estimate = estimates(effect.name, {key: effect.parameters()[key]}, {key: found.sd})
-    share = MOST_CONFIDENCE / (1 + len(found.also))
-    rivals = tuple((name, share) for name in found.also)
+    estimate = estimates(effect.name, {key: effect.parameters()[key]}, {key: missing.sd})
+    share = MOST_CONFIDENCE / (1 + len(missing.also))
+    rivals = tuple((name, share) for name in missing.also)
     return NamedEffect(effect.name, candidate(effect.name).family, share, estimate, rivals)
 
 
-def named_by_search(comparison: Comparison, found: Fit, turn: Round, place: str, time: str) -> NamedEffect:
-    """A kept candidate with the others of its round, weighted by their likelihoods; place, time: where and when."""
-    weights = [(f.name, relative_likelihood(f.misfit, found.misfit)) for f in turn.fits if f.name != found.name]
+def named_by_search(comparison: Comparison, fit: Fit, turn: Round, place: str, time: str) -> NamedEffect:
+    """A kept candidate with the others of its round, weighted by their likelihoods.
+
+    Args:
+        comparison: the measurement beside the null model.
+        fit: the candidate's fit.
+        turn: its round.
+        place: part of the array in which it acts.
+        time: part of the recordings in which it acts.
+    """
+    weights = [(f.name, relative_likelihood(f.misfit, fit.misfit)) for f in turn.fits if f.name != fit.name]
     total = 1.0 + sum(w for _, w in weights)
     return NamedEffect(
-        found.name,
-        candidate(found.name).family,
+        fit.name,
+        candidate(fit.name).family,
         min(1.0 / total, MOST_CONFIDENCE),
-        estimates(found.name, found.parameters, found.sd),
+        estimates(fit.name, fit.parameters, fit.sd),
         tuple((name, w / total) for name, w in weights),
         where=place,
         when=time,
@@ -63,12 +71,12 @@ def named_by_search(comparison: Comparison, found: Fit, turn: Round, place: str,
 
 
 def relative_likelihood(misfit: float, best: float) -> float:
-    """Of a fit against the best one, at most 1: misfits are deviances, twice a log likelihood."""
+    """Likelihood of a fit over that of the best, at most 1: misfits are deviances, twice a log likelihood."""
     return float(np.exp(-max(misfit - best, 0.0) / 2))
 
 
 def removed_instead(comparison: Comparison, turn: Round) -> dict[str, float]:
-    """Share of the gap that the others of a round would remove alone, of those that were confirmed by several twins."""
+    """Share of the gap that the others of a round would remove alone, if several twins confirmed them."""
     case, null, values, given = comparison.case, comparison.null, comparison.values, comparison.given
     confirmed = [f for f in turn.fits[1:] if len(f.prediction.draws) > 1]
     return {f.name: gap_of(case, null, values, given, f.prediction).removed for f in confirmed}

@@ -21,7 +21,7 @@ class Note(str, Enum):
         "The recordings to fit agree with the model, as given or with the effects found first; those held out do not. "
         "Held-out recordings of moving light were therefore fitted: the gap on them is no independent check."
     )
-    """Nothing but motion held out shows what is missing."""
+    """Only held-out motion disagrees with the model."""
 
     __str__ = str.__str__  # the sentence, as StrEnum has it from Python 3.11 on
 

@@ -16,7 +16,9 @@ from spikecam_env.gap.verdict.named_effects import estimates
 def ranking(rounds: Sequence[Round], found: Sequence[tuple[Fit, Round]], accept: float) -> tuple[Ranked, ...]:
     """Every fit of every round: the one that was kept, then the others, the smallest misfit first.
 
-    found: those that were kept, with their rounds.  accept: reduction in misfit that is asked of an effect.
+    Args:
+        found: fits that were kept, with their rounds.
+        accept: reduction in misfit that an effect has to make.
     """
     rows: list[Ranked] = []
     for turn in rounds:
@@ -27,28 +29,28 @@ def ranking(rounds: Sequence[Round], found: Sequence[tuple[Fit, Round]], accept:
     return tuple(rows)
 
 
-def ranked(found: Fit, turn: Round, accept: float, *, accepted: bool) -> Ranked:
-    """A row of the ranking; the misfit of what was added is beside all that was found, in their noise."""
-    worst = float(np.abs(found.rho).max())
-    reason = f"leaves {worst:.1f} noises at worst" if accepted else reason_against(found, turn, accept)
-    own = estimates(found.name, found.parameters, found.sd)
-    return Ranked(found.name, candidate(found.name).family, turn.misfit, found.misfit, own, accepted, reason)
+def ranked(fit: Fit, turn: Round, accept: float, *, accepted: bool) -> Ranked:
+    """A row of the ranking; the misfit of an added effect is that of all added effects together, in their noise."""
+    worst = float(np.abs(fit.rho).max())
+    reason = f"leaves {worst:.1f} noises at worst" if accepted else reason_against(fit, turn, accept)
+    own = estimates(fit.name, fit.parameters, fit.sd)
+    return Ranked(fit.name, candidate(fit.name).family, turn.misfit, fit.misfit, own, accepted, reason)
 
 
-def reason_against(found: Fit, turn: Round, accept: float) -> str:
+def reason_against(fit: Fit, turn: Round, accept: float) -> str:
     """Why a fit of a round was not added, or not kept."""
     chosen = turn.fits[0]
-    if turn.misfit - found.misfit >= accept:
-        if found is chosen:
+    if turn.misfit - fit.misfit >= accept:
+        if fit is chosen:
             return "not kept: it explains nothing more beside the others, or on held-out recordings"
-        if found.misfit < chosen.misfit:
-            return _reason_against_better(found, chosen)
-    return why_rejected(found.misfit, turn.misfit, chosen.name, accept)
+        if fit.misfit < chosen.misfit:
+            return _reason_against_better(fit, chosen)
+    return why_rejected(fit.misfit, turn.misfit, chosen.name, accept)
 
 
-def _reason_against_better(found: Fit, chosen: Fit) -> str:
+def _reason_against_better(fit: Fit, chosen: Fit) -> str:
     """Why one with a smaller misfit was not chosen (`search.choice`)."""
-    if len(found.prediction.draws) < 2:
+    if len(fit.prediction.draws) < 2:
         return "smaller misfit in a single simulation; further ones did not confirm it"
     preferred = chosen.name.replace("_", " ")
     return f"smaller misfit, but all recordings together, and the number of parameters, favour {preferred}"

@@ -1,9 +1,8 @@
-"""The remainder: what named effects leave beyond chance, where their law differs in details from the catalogue's.
+"""The remainder: the distance that named effects leave beyond chance, where their law differs from the catalogue's.
 
-It is judged in all, and where it is left, by group of statistics and recording: what was far off elsewhere makes it no
-smaller there, so that a strong effect hides no other.  The best stand-in of a mechanism outside of the catalogue may
-take 99.9 % of the sum of squares, and yet leaves some group of some recording as it was; the right name of a slightly
-different law does not.
+It is judged in total, and by group of statistics and recording.  So a strong effect hides no other one elsewhere.  The
+best stand-in of a mechanism outside of the catalogue may take 99.9 % of the sum of squares.  Yet it leaves some group
+of some recording unchanged.  The right name of a slightly different law does not.
 """
 
 from __future__ import annotations
@@ -23,14 +22,19 @@ from spikecam_env.types import Floats
 def explains(null: Null, values: Floats, predicted: Prediction) -> bool:
     """Whether a prediction leaves nothing of measured statistics (S,) but chance, or a remainder.
 
-    A remainder is small in all (`most_left`) and wherever it is left (`most_left_there`), beside what the null model
-    leaves.  Both are measured in the noise of the null model: that of the prediction contains a share of the change
-    that it predicts, so that what it leaves would look small.
+    A remainder is a small share of the null model's distance in total (`most_left`), and in every group of every
+    recording (`most_left_there`).  Both are in the noise of the null model: the noise of the prediction contains a
+    share of its change, and would make the remainder look small.
+
+    Args:
+        values: (S,) measured statistics.
     """
     off, limits = is_left(null, values, predicted), null.settings.concluding
     before, after = (in_noise(null, values, mean) for mean in (null.mean, predicted.mean))
-    there = sums_by_place(null.keys, before**2 - 1.0)
-    little = sums_by_place(null.keys, np.where(off, after**2, 0.0)) <= limits.most_left_there * np.maximum(there, 1.0)
+    at_first = sums_by_place(null.keys, before**2 - 1.0)
+    little = sums_by_place(null.keys, np.where(off, after**2, 0.0)) <= limits.most_left_there * np.maximum(
+        at_first, 1.0
+    )
     deviance = [robust_beyond_chance(null, rho) for rho in (before, residual(null, values, predicted))]
     return bool(not off.any() or (np.all(little) and deviance[1] < limits.most_left * deviance[0]))
 
@@ -38,8 +42,13 @@ def explains(null: Null, values: Floats, predicted: Prediction) -> bool:
 def remainder_of(
     null: Null, values: Floats, predicted: Prediction, where: str = "", when: str = ""
 ) -> Remainder | None:
-    """What a prediction leaves of measured statistics (S,) beyond chance; None where it leaves none.  where, when: as
-    of `Remainder`."""
+    """The remainder of a prediction; None where it leaves no more than chance.
+
+    Args:
+        values: (S,) measured statistics.
+        where: part of the array, for `Remainder`.
+        when: part of the time, for `Remainder`.
+    """
     off = is_left(null, values, predicted)
     if not off.any():
         return None
@@ -61,7 +70,7 @@ def remainder_of(
 
 
 def is_left(null: Null, values: Floats, predicted: Prediction) -> NDArray[np.bool_]:
-    """(S,) which of measured statistics a prediction leaves off, beyond chance and what laws are known to at all."""
+    """(S,) whether a statistic is off the prediction by more than chance and the accuracy of laws."""
     p = adjusted(normal_deviates(null, residual(null, values, predicted), predicted))
     return np.asarray(p < null.settings.judging.gate)
 
@@ -80,10 +89,10 @@ def sums_by_place(keys: Sequence[StatisticKey], squares: Floats) -> Floats:
 
 
 def robust_beyond_chance(null: Null, rho: Floats) -> float:
-    """Deviance of residuals (S,) beyond what chance makes: one that is far off counts by its logarithm."""
+    """Deviance of residuals (S,) less that of chance; a large residual counts by its logarithm."""
     return loss(null, rho) - float(np.sum(null.weight * np.ones(len(rho))))
 
 
 def beyond_chance(null: Null, distances: Floats) -> float:
-    """Sum of squares of distances (S,) beyond what chance makes, at least 0; by the null's weights."""
+    """Sum of squares of distances (S,) less that of chance, at least 0; by the null's weights."""
     return max(float(np.sum(null.weight * (distances**2 - 1.0))), 0.0)

@@ -1,10 +1,10 @@
-"""The score of an effect: a number of a campaign that it makes larger, and what campaigns with the effect score.
+"""The score of an effect: a number of a campaign that the effect makes larger, and its distribution with the effect.
 
-A score, linear in the statistics, is taken along what the effect changes where it is strong.  Campaigns with the effect
-at a weaker strength say how large the score then is, and how widely it scatters.
+A score is linear in the statistics, along the change by the effect at a large strength.  Campaigns with the effect at a
+weaker strength give the mean and the scatter of the score.
 
-Of what is counted (false spikes, hot pixels) a strength that lets expect RULE_OF_THREE of them or fewer is never
-refuted: one campaign in twenty has none.
+A strength with RULE_OF_THREE expected events (false spikes, hot pixels) or fewer is never refuted: one campaign in
+twenty has none.
 """
 
 from __future__ import annotations
@@ -41,19 +41,22 @@ RULE_OF_THREE = -float(np.log(1.0 - CONFIDENCE))
 
 @dataclass(frozen=True)
 class Score:
-    """One number of a campaign that an effect makes larger.
-
-    of: (S,) statistics -> score.  without: (n,) of campaigns without the effect.  error: of the score, by what labels
-    and laws are not known to.  rise: how much more it is at `parameters`, where the unit `bare` settled as `unit`.
-    """
+    """One number of a campaign that an effect makes larger."""
 
     of: Callable[[Floats], float]
+    """(S,) statistics -> score."""
     without: Floats
+    """(n,) scores of campaigns without the effect."""
     error: float
+    """Error of the score by the accuracy of labels and laws."""
     parameters: Parameters
+    """Parameters at which the score was taken."""
     rise: float
+    """Score at `parameters` less that without the effect."""
     bare: BaseFit | None = None
+    """The unit at `parameters` before it settled."""
     unit: BaseFit | None = None
+    """The unit at `parameters` after it settled."""
 
     @property
     def mean(self) -> float:
@@ -68,8 +71,10 @@ class Score:
 
     @property
     def likely_sds(self) -> float:
-        """Standard deviations by which a refuted strength is likely to lie above what is seen: Student's quantile of
-        CONFIDENCE for so many campaigns without the effect, 1.8 of eleven."""
+        """Standard deviations by which a refuted strength is likely to lie above the measurement.
+
+        Student's quantile of CONFIDENCE for the campaigns without the effect, 1.8 for eleven.
+        """
         return float(scipy.stats.t.ppf(CONFIDENCE, len(self.without) - 1))
 
     @property
@@ -80,16 +85,16 @@ class Score:
 
 @dataclass(frozen=True)
 class StrengthTest:
-    """A strength that was simulated.  excess: mean score of its campaigns, beyond that without the effect; sd: of the
-    distance of a campaign from that mean; quantile: of that distance, CONFIDENCE of campaigns are nearer or above.
-
-    events: expected of what can be counted, infinite elsewhere.
-    """
+    """A strength that was simulated."""
 
     excess: float
+    """Mean score of its campaigns less that without the effect."""
     sd: float
+    """Standard deviation of a campaign's distance from that mean."""
     quantile: float
+    """Quantile of that distance over `sd`: CONFIDENCE of campaigns are nearer or above."""
     events: float
+    """Expected number of events of an effect of single events, infinite elsewhere."""
 
     def refuted_by(self, excess: float) -> bool:
         """Whether a campaign that scores so much scores too little for it."""
@@ -104,20 +109,29 @@ class EffectProbe:
         self.settings = case.settings
 
     def events(self, parameters: Parameters) -> float:
-        """Expected of what can be counted; infinite elsewhere."""
+        """Expected number of events of an effect of single events, infinite elsewhere."""
         return expected_events(self.name, parameters, self.case.conditions, self.case.observations)
 
     @staticmethod
     def score_variance(score: Score, scores: Floats, excess: float, events: float) -> float:
-        """Of the score of a campaign with the effect, `excess` on average: what few campaigns show, and at least what
-        there is without it and what so few events make."""
+        """Variance of the score of a campaign with the effect.
+
+        By few campaigns, and at least the variance without the effect and that of the number of events.
+
+        Args:
+            scores: (n,) scores of campaigns with the effect.
+            excess: their mean less that without the effect.
+            events: expected number of events.
+        """
         by_chance = excess**2 / events
         return max(float(np.var(scores, ddof=1)), float(np.var(score.without, ddof=1)) + by_chance)
 
 
 class TwinProbe(EffectProbe):
-    """Scores of twins of the campaign.  The last draws, with the effect where it is strong, select statistics;
-    the first, how they change where it is weak."""
+    """Scores of twins of the campaign.
+
+    The last draws, with a strong effect, select the statistics.  The first show their change at a weak strength.
+    """
 
     def __init__(self, case: Case, model: SensorModel, null: Null, measured: Floats, name: str):
         super().__init__(case, model, null, name)
@@ -137,11 +151,11 @@ class TwinProbe(EffectProbe):
             return predict_by_twins(self.case, model, unit, self.null, count, self.only)
 
         made, unit = at_settled_unit(probe, self.null, strong, bare, [])
-        found = (self._scatter_score if self.random_course else self._change_score)(made, parameters)
-        return replace(found, bare=bare, unit=unit) if found else None
+        score = (self._scatter_score if self.random_course else self._change_score)(made, parameters)
+        return replace(score, bare=bare, unit=unit) if score else None
 
     def refined(self, score: Score) -> Score:
-        """The score of single events by more campaigns: of few, which statistics they change is chance."""
+        """The score of single events by more campaigns: in few, the statistics that change are chance."""
         if not candidate(self.name).share:
             return score
         return self.score(score.parameters, twins_of(self.name)) or score
@@ -169,7 +183,7 @@ class TwinProbe(EffectProbe):
         return Score(of, without, 0.0, parameters, rise)
 
     def test(self, score: Score, parameters: Parameters) -> StrengthTest:
-        """What campaigns with the effect at a strength score."""
+        """Scores of campaigns with the effect at a strength."""
         assert score.bare is not None and score.unit is not None
         key, events = strength_of(self.name), self.events(parameters)
         times = abs(parameters[key] / score.parameters[key]) ** power_of(self.name)
@@ -204,11 +218,11 @@ class UnitProbe(EffectProbe):
         return linear(self.null, change, self.without, parameters)
 
     def refined(self, score: Score) -> Score:
-        """The same: units are many."""
+        """The score itself: units are many."""
         return score
 
     def test(self, score: Score, parameters: Parameters) -> StrengthTest:
-        """What units with the effect at a strength score."""
+        """Scores of units with the effect at a strength."""
         units, events = self._units(with_effect(self.model, self.name, parameters)), self.events(parameters)
         scores = np.array([score.of(v) for v in units])
         excess, n = float(scores.mean()) - score.mean, len(units)
@@ -228,10 +242,15 @@ def linear(
     parameters: Parameters,
     scatter: Floats | float = 0.0,
 ) -> Score | None:
-    """The score along what an effect changes (S,) at some strength; None where it changes nothing.
+    """The score along the change by an effect; None where it changes nothing.
 
-    scatter: (S,) by which that differs from campaign to campaign: what few events change by much is known poorly.
-    Statistics of unknown noise, as those of a pattern in the dark without a spike, count for nothing.
+    Statistics of unknown noise do not count, such as those of a pattern in the dark without a spike.
+
+    Args:
+        change: (S,) change of the statistics at `parameters`.
+        without: statistics (S,) of campaigns without the effect.
+        parameters: parameters of the effect.
+        scatter: (S,) standard deviation of the change over campaigns; a change by few events is known poorly.
     """
     most = CLEAR  # one false spike in a quiet pixel is a hundred noises
     deviates = np.clip(np.nan_to_num(change / null.noise), -most, most)
@@ -244,13 +263,13 @@ def linear(
 
 
 def linear_score(null: Null, weight: Floats, values: Floats) -> float:
-    """Score of statistics (S,) along a change; what is unknown counts for nothing."""
+    """Score of statistics (S,) along a change; unknown statistics do not count."""
     most = CLEAR
     return float(weight @ np.clip(in_noise(null, values), -most, most))
 
 
 def log_mean_square(null: Null, weight: Floats, values: Floats) -> float:
-    """Score of statistics (S,) that an effect scatters, each way equally: the logarithm of their mean square."""
+    """Score of statistics (S,) that an effect scatters both ways equally: the logarithm of their mean square."""
     square = float(weight @ in_noise(null, values) ** 2)
     return float(np.log(max(square, 1e-12)))
 
@@ -261,5 +280,5 @@ def strength_of(name: str) -> str:
 
 
 def power_of(name: str) -> float:
-    """The power of a strength that statistics go with."""
+    """The power of the strength to which the change of the statistics is proportional."""
     return candidate(name).power

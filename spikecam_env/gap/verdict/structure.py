@@ -1,19 +1,21 @@
-"""What a discrepancy that no candidate explains looks like: the first questions an engineer would ask."""
+"""The description of a discrepancy that no candidate explains: the first questions an engineer would ask."""
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
 
 from spikecam_env.gap.compare.distance import CLEAR, HEAVY
 from spikecam_env.gap.compare.prediction import Null
+from spikecam_env.gap.statistics import StatisticKey
 from spikecam_env.gap.twins.case import Case
 from spikecam_env.gap.verdict.where_and_when import when, where
 from spikecam_env.types import Floats
 
 COMMON_SHARE = 0.3
-"""Of all that is off, what statistics of many pixels have where a difference is common to them."""
+"""Share of all deviations that statistics of many pixels have where a difference is common to them."""
 
 LEAST_LEVELS = 3
 """Flats on which a statistic has to be clearly off for its power of the level."""
@@ -23,30 +25,26 @@ _COMMON = ("spectrum", "rows", "neighbours")
 
 
 def structure(case: Case, null: Null, off: Floats) -> dict[str, Any]:
-    """Its description, as in `unknown` of diagnosis.json.
+    """The description of a discrepancy, as in `unknown` of diagnosis.json.
 
-    off: (S,) measured less predicted, in noise, under the null model.
+    Args:
+        off: (S,) measured less predicted, in noise, under the null model.
     """
     kind = {c.name: c.kind for c in case.conditions}
     level = {c.name: c.level for c in case.conditions}
-    seen = np.abs(off) > CLEAR
-    weight = {g: 0.0 for g in dict.fromkeys(k.group for k in null.keys)}
-    for k, o in zip(null.keys, off, strict=True):
-        weight[k.group] += float(np.log1p(o**2 / HEAVY))
+    weight = weight_by_group(null, off)
     order = sorted(weight, key=lambda g: -weight[g])
-    keys = [k for k, s in zip(null.keys, seen, strict=True) if s]
-    dark = any(kind[k.recording] == "dark" and k.group != "rates" for k in keys)
-    lit = any(kind[k.recording] not in ("dark",) for k in keys)
-    common = sum(weight[g] for g in _COMMON if g in weight)
     total = max(sum(weight.values()), 1e-9)
+    common = sum(weight[g] for g in _COMMON if g in weight)
+    clear = np.abs(off) > CLEAR
+    keys = [k for k, is_clear in zip(null.keys, clear, strict=True) if is_clear]
+    is_common = common > COMMON_SHARE * total
     return {
-        "light": "in the dark and in the light" if dark and lit else "in the dark" if dark else "in the light",
+        "light": light_of(keys, kind),
         "level_exponent": level_exponent(null, off, kind, level),
-        "extent": "common to many pixels" if common > COMMON_SHARE * total else "pixel by pixel",
+        "extent": "common to many pixels" if is_common else "pixel by pixel",
         "time_scale_s": None,
-        "history": any(k.group in _MEMORY and k.name not in ("level", "square", "row", "column") for k in keys),
-        "neighbours": any(k.group == "neighbours" for k in keys),
-        "clock": any(k.group == "clock" and not k.name.endswith("between") for k in keys),
+        **marks_of(keys),
         "where": where(case) or None,
         "when": when(case) or None,
         "worst_group": order[0] if order else None,
@@ -54,9 +52,41 @@ def structure(case: Case, null: Null, off: Floats) -> dict[str, Any]:
     }
 
 
+def weight_by_group(null: Null, off: Floats) -> dict[str, float]:
+    """Sum of the logarithmic loss of distances (S,) in noise, by group of statistics."""
+    weight = {g: 0.0 for g in dict.fromkeys(k.group for k in null.keys)}
+    for k, o in zip(null.keys, off, strict=True):
+        weight[k.group] += float(np.log1p(o**2 / HEAVY))
+    return weight
+
+
+def light_of(keys: Sequence[StatisticKey], kind: Mapping[str, str]) -> str:
+    """Whether statistics are off in the dark, in the light, or in both; kind: of each recording."""
+    dark = any(kind[k.recording] == "dark" and k.group != "rates" for k in keys)
+    lit = any(kind[k.recording] != "dark" for k in keys)
+    return "in the dark and in the light" if dark and lit else "in the dark" if dark else "in the light"
+
+
+def marks_of(keys: Sequence[StatisticKey]) -> dict[str, bool]:
+    """Whether statistics that are off show a memory, a coupling of neighbours, or the array's clock."""
+    return {
+        "history": any(k.group in _MEMORY and k.name not in ("level", "square", "row", "column") for k in keys),
+        "neighbours": any(k.group == "neighbours" for k in keys),
+        "clock": any(k.group == "clock" and not k.name.endswith("between") for k in keys),
+    }
+
+
 def level_exponent(null: Null, off: Floats, kind: dict[str, str], level: dict[str, float]) -> float | None:
-    """Slope of log |statistic| on log level over the flats, of the statistic that is seen on most of them, the
-    first of several."""
+    """Slope of log |statistic| on log level over the flats, of the statistic that is clearly off on most of them.
+
+    Args:
+        off: (S,) distances, in noise.
+        kind: kind of each recording.
+        level: level of each recording.
+
+    Returns:
+        The slope, of the first of several such statistics; None below `LEAST_LEVELS` flats.
+    """
     best: tuple[float, float] | None = None
     for group, name in dict.fromkeys((k.group, k.name) for k in null.keys):
         points = [

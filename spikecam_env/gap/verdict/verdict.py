@@ -1,4 +1,4 @@
-"""The verdict: whether what was found explains the campaign, and what is said where it does not."""
+"""The verdict: whether the effects explain the campaign, and the description of the rest where they do not."""
 
 from __future__ import annotations
 
@@ -36,12 +36,12 @@ from spikecam_env.types import Floats
 
 
 def conclude(comparison: Comparison, rounds: Sequence[Round], floor: float) -> Conclusion:
-    """From a search to a verdict.
+    """The verdict by the rounds of a search.
 
     Args:
         comparison: the measurement beside the null model.
-        rounds: of the search; empty without an alarm.
-        floor: of the gap, by two halves of the measurement.
+        rounds: rounds of the search; none without an alarm.
+        floor: floor of the gap, by two halves of the measurement.
     """
     case, null = comparison.case, comparison.null
     last = rounds[-1].prediction if rounds else null.prediction
@@ -83,10 +83,9 @@ def verdict_of(
 
     Args:
         comparison: the measurement beside the null model.
-        rounds: of the search.
         found: effects that were kept, with their rounds.
         explained: whether the last round leaves chance, or a remainder.
-        remainder: what is left of it; None if nothing is.
+        remainder: the remainder, if there is one.
     """
     enough = found and explained and not second_left_out(comparison.case)
     if comparison.contradictions:
@@ -101,8 +100,11 @@ def verdict_of(
 def parameters_off(comparison: Comparison, rounds: Sequence[Round]) -> dict[str, dict[str, float]]:
     """Effects of the tested model that the unit has in another amount.
 
-    They are judged by the unit in which the search ended, beside the patterns that it found.  A parameter that the
-    effects found scatter by more than it is off is not among them.
+    They are judged by the last unit of the search, beside the patterns that it added.  A parameter that the added
+    effects scatter by more than it is off is not among them.
+
+    Args:
+        comparison: the measurement beside the null model.
 
     Returns:
         {effect: {measured, nominal, ratio}}, in the unit of the effect's strength.
@@ -131,8 +133,13 @@ def is_scattered(name: str, unit: Mapping[str, float], as_read: Mapping[str, Map
 
 
 def off_beside(case: Case, tested: SensorModel, last: Round, unit: BaseFit) -> OffNominal:
-    """What a unit has in another amount than the tested model, beside the patterns that the search ended with: what
-    these effects that make pixels differ explain, its own spreads do not."""
+    """Parameters of the tested model that a unit has in another amount, beside the patterns that the search added.
+
+    The added patterns, and not the model's own spreads, explain how pixels differ.
+
+    Args:
+        tested: the model under test.
+    """
     patterns = (e for e in last.model.effects if candidate(e.name).is_pattern)
     return off_nominal(case, reduce(SensorModel.with_effect, patterns, tested), unit)
 
@@ -148,11 +155,14 @@ def second_left_out(case: Case) -> bool:
 
 
 def with_stand_ins(case: Case, null: Null, values: Floats, rounds: Sequence[Round]) -> list[Round]:
-    """The rounds up to the one that is named: the last that explains the data and takes most of what the one before it
-    leaves.  What takes less stands for details of that one's law.
+    """The rounds up to the one that is named: the last that explains the data and takes most of the earlier remainder.
 
-    If none explains the data, they end where the held-out gap is smallest: an empirical patch has to be of use in
-    recordings that took no part."""
+    A round that takes less stands for details of the earlier law.  If none explains the data, the rounds end at the
+    smallest held-out gap: an empirical patch has to be of use in recordings that took no part.
+
+    Args:
+        values: (S,) measured statistics.
+    """
     *before, last = rounds
     explaining = [r for r in rounds[1:] if explains(null, values, r.prediction)]
     if explaining:
@@ -167,14 +177,18 @@ def with_stand_ins(case: Case, null: Null, values: Floats, rounds: Sequence[Roun
 
 
 def with_given_parameters(problem: Problem, tested: SensorModel, rounds: Sequence[Round]) -> list[Round]:
-    """The rounds with the tested model's parameters as they are in the unit, if these explain the data beside the
-    effects that the rounds end with, and the unit's own take no more than half of what they leave.
+    """The rounds with the tested model's nominal parameters in the last unit, where these explain the data as well.
 
-    An effect whose law differs in details scatters what a parameter is known by.  problem: of the null model.
+    The fitted ones stay where they take more than half of the nominal ones' remainder.  An effect whose law differs in
+    details moves the statistics by which a parameter is known.
+
+    Args:
+        problem: the problem of the null model.
+        tested: the model under test.
     """
     *before, last = rounds
-    null, values, found = problem.null, problem.values, {e.name for e in last.model.effects}
-    if found <= {e.name for e in tested.effects} or not explains(null, values, last.prediction):
+    null, values, names = problem.null, problem.values, {e.name for e in last.model.effects}
+    if names <= {e.name for e in tested.effects} or not explains(null, values, last.prediction):
         return list(rounds)
     off = off_beside(problem.case, tested, last, last.base)
     count = problem.settings.twins.in_the_end
@@ -203,7 +217,7 @@ def named(
 
 
 def described(comparison: Comparison, found: Sequence[tuple[Fit, Round]]) -> dict[str, Any]:
-    """What an unknown discrepancy looks like, and what was not looked for."""
+    """The structure of an unknown discrepancy, and the search that was left out."""
     case = comparison.case
     about = structure(case, comparison.null, comparison.residuals)
     about["best_candidate"] = found[0][0].name if found else None
@@ -213,7 +227,7 @@ def described(comparison: Comparison, found: Sequence[tuple[Fit, Round]]) -> dic
 
 
 def enough_effort(case: Case) -> int:
-    """Budget with which another effect would have been looked for beside those found, in tens."""
+    """Budget with which another effect would have been searched for, in tens."""
     another = case.settings.searching.campaigns_per_effect
     return 10 * math.ceil((case.budget.simulated / len(case.conditions) + another + 1) / 10)
 
@@ -225,7 +239,13 @@ def tied(found: Sequence[tuple[Fit, Round]]) -> dict[str, Any]:
 
 
 def statistics_rows(comparison: Comparison, after: Floats, left: Floats) -> tuple[Statistic, ...]:
-    """Every statistic under the model as given, and after: (S,) its mean, and what that leaves in noise."""
+    """Every statistic under the model as given, and with the effects.
+
+    Args:
+        comparison: the measurement beside the null model.
+        after: (S,) means of the model with the effects.
+        left: (S,) residuals of that model, in noise.
+    """
     case, null, values, given = comparison.case, comparison.null, comparison.values, comparison.given
     z = deviates(replace(null, mean=given), values)
     p = adjusted(z)

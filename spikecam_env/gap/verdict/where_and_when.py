@@ -68,7 +68,7 @@ def fields_of(shape: tuple[int, int]) -> NDArray[np.int64]:
 
 
 def outlying_counts(irregular: Floats, fields: NDArray[np.int64]) -> NDArray[np.bool_]:
-    """(9,) fields with more irregular intervals, (P,) of each pixel, than the median field lets expect."""
+    """(9,) whether a field has more irregular intervals (P,) than expected by the median field."""
     count = np.bincount(fields, irregular, FIELDS_PER_SIDE**2)
     share = np.bincount(fields, minlength=FIELDS_PER_SIDE**2) / fields.size
     usual = float(np.median(count / share))
@@ -78,8 +78,14 @@ def outlying_counts(irregular: Floats, fields: NDArray[np.int64]) -> NDArray[np.
 
 
 def outlying_means(values: Floats, fields: NDArray[np.int64]) -> NDArray[np.bool_]:
-    """(9,) fields whose median of (P,) values, relative rates, stands out from its error, sqrt(pi / 2) sd / sqrt(n),
-    from the scatter of the others, and by what is clear of what labels can be known to."""
+    """(9,) whether the median of a field stands out from its error, from the scatter of the others, and from labels.
+
+    The error of a median is sqrt(pi / 2) sd / sqrt(n).
+
+    Args:
+        values: (P,) relative rates.
+        fields: (P,) field of each pixel.
+    """
     mean = np.array([np.median(values[fields == f]) for f in range(FIELDS_PER_SIDE**2)])
     off = np.abs(mean - np.median(mean))
     inside = np.sort(off)[: FIELDS_PER_SIDE**2 - FIELDS_PER_SIDE]
@@ -100,7 +106,7 @@ def rows_and_columns(field: int, shape: tuple[int, int]) -> str:
 
 
 def when(case: Case) -> str:
-    """From (or until) which part of steady recordings it acts; empty where always."""
+    """The half of steady recordings in which a discrepancy acts; empty where always."""
     votes = []
     irregular = np.zeros(2)
     for c, o in zip(case.conditions, case.observations, strict=True):
@@ -125,25 +131,37 @@ def when(case: Case) -> str:
 
 
 def later_half(halves: Floats, noises: float, share: float) -> list[bool]:
-    """Whether there are more counts in the second half; nothing where that may be chance: halves that differ by less
-    than `noises`, or by less than a share of all."""
+    """[whether there are more counts in the second half]; empty where that may be chance.
+
+    Args:
+        halves: (2,) counts.
+        noises: standard deviations by which they have to differ.
+        share: share of all counts by which they have to differ.
+    """
     first, second = halves
     clear = abs(first - second) > max(noises * np.sqrt(first + second), share * (first + second))
     return [bool(second > first)] if clear else []
 
 
 def line_in_one_half(first: float, second: float) -> list[bool]:
-    """Whether the line of one half alone is in the second, by their powers; nothing where it is in both or in none.
+    """[whether a line is in the second half alone], by the powers in both; empty where it is in both or in none.
 
-    It has to be twice as strong as one of a whole recording."""
+    It has to be twice as strong as one of a whole recording.
+    """
     stronger, weaker = max(first, second), min(first, second)
     clear = stronger > 2 * LINE and stronger > LINE_RATIO * weaker
     return [second > first] if clear else []
 
 
 def step_in_the_middle(blocks: Floats, noises: float) -> list[bool]:
-    """A step of the array's rate in the middle, beyond what labels can be known to, that explains nearly all of its
-    change: it is larger than `noises` times what it leaves."""
+    """[whether the array's rate rises in the middle]; empty without a step.
+
+    A step exceeds the error of labels, and `noises` times the scatter that it leaves.
+
+    Args:
+        blocks: (n,) rates of the array in blocks of time.
+        noises: factor of the scatter.
+    """
     whole = blocks[: TIME_BLOCKS // 2 * 2] / blocks.mean()
     first, second = whole[: len(whole) // 2], whole[len(whole) // 2 :]
     step = float(second.mean() - first.mean())

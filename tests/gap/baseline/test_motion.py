@@ -7,7 +7,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from benchmarks.motion_limits import CHANGES_IN_TIME, SHAPE, ball, drift, looked_at, picture, square
 from spikecam_env.campaign import read_campaign
 from spikecam_env.campaign.writing import finish_campaign, save_spikes
 from spikecam_env.errors import InputError
@@ -24,6 +23,7 @@ from spikecam_env.gap.settings import DiagnosisSettings
 from spikecam_env.gap.twins.unknown_scene import correction
 from spikecam_env.sensor import CATALOGUE, Keyframes, SensorModel, SpikeSensor
 from spikecam_env.streams import pack_frames
+from tests.gap.baseline.motion_scenes import CHANGES_IN_TIME, SHAPE, ball, drift, looked_at, picture, square
 
 FRAMES = 500
 SCSIM = SensorModel.preset("scsim")

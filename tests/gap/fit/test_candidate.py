@@ -1,4 +1,4 @@
-"""Scaling an effect to a measurement, which recordings it concerns, and what is a candidate."""
+"""Scaling an effect to a measurement, the recordings that it concerns, and the candidates."""
 
 from __future__ import annotations
 
@@ -39,7 +39,8 @@ def test_scale_is_recovered_within_its_stated_error(true):
 
 
 def test_the_slope_of_what_saturates_is_told_by_two_twins():
-    """The logarithm of a line beside noise: twice the strength is not four times the change.  What one lacks is out."""
+    """The logarithm of a line beside noise: twice the strength is not four times the change.  A statistic that one
+    of the twins lacks is left out."""
     n = null()
     line = lambda strength: 40.0 * n.noise * np.log1p(strength**2)  # noqa: E731
     one, other = (Prediction(n.mean + line(s), n.sd / np.sqrt(n.twins), n.sd) for s in (2.0, 2.4))
@@ -136,9 +137,9 @@ def test_a_wrong_effect_leaves_more_than_the_right_one():
 
 def test_every_effect_of_the_catalogue_is_a_candidate_with_a_strength():
     for name, effect_class in CATALOGUE.items():
-        what = candidate(name)
-        assert what.fitted[0] == effect_class.strength, name
-        assert set(what.fitted) | set(what.shapes) <= set(effect_class.__dataclass_fields__), name
+        entry = candidate(name)
+        assert entry.fitted[0] == effect_class.strength, name
+        assert set(entry.fitted) | set(entry.shapes) <= set(effect_class.__dataclass_fields__), name
 
 
 def test_pattern_effects_are_those_that_only_draw_units():

@@ -1,4 +1,4 @@
-"""More twins of a fit, of a weak effect louder ones, and what severe noise leaves open."""
+"""More twins of a fit, stronger ones of a weak effect, and the errors under severe noise."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import numpy as np
 from small import MODEL, TWINS, effect, null, recorded
 
 from spikecam_env.gap.baseline.null_model import model_null
-from spikecam_env.gap.candidates.strength import MOST_EXTRAPOLATED, with_effect
+from spikecam_env.gap.candidates.strength import with_effect
 from spikecam_env.gap.compare.distance import effect_size, is_significant, residual, residual_and_misfit
 from spikecam_env.gap.compare.prediction import values_of
 from spikecam_env.gap.fit.candidate import Fit, fit
@@ -22,33 +22,33 @@ from spikecam_env.gap.unit.refit import constrained_refit
 def test_a_weak_effect_is_told_by_louder_twins_as_well_as_by_many():
     """A dead time that shows by some noises: two twins of it some times as strong, or all twelve of it as it is."""
     case = recorded(effect("dead_time", tau_us=0.02))
-    there = model_null(case, MODEL, TWINS)
-    measured = values_of(case.bank, there.keys)
-    found = fit(Problem(case, MODEL, there, measured, measured), "dead_time", {"tau_us": 0.02})
-    size = effect_size(there, measured, found.prediction.mean - there.mean)
-    loud, times = amplified_fit(Problem(case, MODEL, there, measured, measured), found, "dead_time")
-    assert 1 < times <= MOST_EXTRAPOLATED and loud.parameters == found.parameters
+    without = model_null(case, MODEL, TWINS)
+    measured = values_of(case.bank, without.keys)
+    found = fit(Problem(case, MODEL, without, measured, measured), "dead_time", {"tau_us": 0.02})
+    size = effect_size(without, measured, found.prediction.mean - without.mean)
+    loud, times = amplified_fit(Problem(case, MODEL, without, measured, measured), found, "dead_time")
+    assert 1 < times <= without.settings.twins.most_extrapolated and loud.parameters == found.parameters
     which = [i for i, c in enumerate(case.conditions) if c.use == "fit"]
-    many = predict_by_twins(case, found.model, found.base, there, TWINS, which)
-    few = predict_by_twins(case, found.model, found.base, there, 2, which)
-    louder = attenuated(there, predict_by_twins(case, loud.model, loud.base, there, 2, which), times)
-    off = [float(np.sqrt(np.mean(((p.mean - many.mean) / there.noise) ** 2))) for p in (few, louder)]
+    many = predict_by_twins(case, found.model, found.base, without, TWINS, which)
+    few = predict_by_twins(case, found.model, found.base, without, 2, which)
+    louder = attenuated(without, predict_by_twins(case, loud.model, loud.base, without, 2, which), times)
+    off = [float(np.sqrt(np.mean(((p.mean - many.mean) / without.noise) ** 2))) for p in (few, louder)]
     print(f"shows by {size:.1f}; two twins are {off[0]:.2f} noises off, {times:.2f} times as loud {off[1]:.2f}")
     assert off[1] < 0.7 * off[0]
-    draws = np.mean([d.values for d in louder.draws], axis=0) - np.mean([d.values for d in there.draws[-2:]], axis=0)
-    np.testing.assert_allclose(louder.mean - there.mean, np.nan_to_num(draws), atol=1e-9)
+    draws = np.mean([d.values for d in louder.draws], axis=0) - np.mean([d.values for d in without.draws[-2:]], axis=0)
+    np.testing.assert_allclose(louder.mean - without.mean, np.nan_to_num(draws), atol=1e-9)
 
 
 def test_what_slow_pixels_do_under_a_severe_noise_is_open_where_they_are_not_known():
     """Dark levels all alike, as of pixels that have locked to the noise, against those of a fresh unit; bright light
     does not depend on them."""
-    case, there = recorded(), null()
+    case, without = recorded(), null()
     loud = with_effect(MODEL, "common_threshold_noise", {"sigma_mV": 20.0})
     alike = constrained_refit(loud, replace(case.base, dark=np.full_like(case.base.dark, np.median(case.base.dark))))
-    made = predict_by_twins(case, loud, alike, there, 2)
-    wider = with_dark_levels_open(Problem(case, MODEL, there, there.mean, there.mean), loud, alike, made)
-    more = dict(zip(there.keys, np.sqrt(wider.error**2 - made.error**2) / there.noise, strict=True))
-    slopes = {k.recording: more[k] for k in there.keys if k.name == "slope"}
+    made = predict_by_twins(case, loud, alike, without, 2)
+    wider = with_dark_levels_open(Problem(case, MODEL, without, without.mean, without.mean), loud, alike, made)
+    more = dict(zip(without.keys, np.sqrt(wider.error**2 - made.error**2) / without.noise, strict=True))
+    slopes = {k.recording: more[k] for k in without.keys if k.name == "slope"}
     print(slopes)
     np.testing.assert_array_equal(wider.mean, made.mean)
     assert slopes["flat-0.03"] > 3 and slopes["flat-0.65"] < 3
@@ -56,11 +56,11 @@ def test_what_slow_pixels_do_under_a_severe_noise_is_open_where_they_are_not_kno
 
 def test_two_twins_of_all_together_do_not_make_noise_seen_before_small():
     """A prediction of two twins that happen to agree, where many have scattered by ten noises."""
-    case, there = recorded(effect("dead_time", tau_us=0.02)), null()
-    measured = values_of(case.bank, there.keys)
-    found = fit(Problem(case, MODEL, there, measured, measured), "dead_time", {"tau_us": 0.02})
-    noisy = replace(found.prediction, spread=10.0 * there.sd, error=5.0 * there.sd)
-    wide = no_more_certain(Problem(case, MODEL, there, measured, measured), found, noisy)
+    case, without = recorded(effect("dead_time", tau_us=0.02)), null()
+    measured = values_of(case.bank, without.keys)
+    found = fit(Problem(case, MODEL, without, measured, measured), "dead_time", {"tau_us": 0.02})
+    noisy = replace(found.prediction, spread=10.0 * without.sd, error=5.0 * without.sd)
+    wide = no_more_certain(Problem(case, MODEL, without, measured, measured), found, noisy)
     np.testing.assert_array_equal(wide.prediction.mean, found.prediction.mean)
     assert np.all(wide.prediction.spread >= noisy.spread) and np.all(wide.prediction.error >= noisy.error)
     assert np.abs(wide.rho).max() < np.abs(found.rho).max()
@@ -68,32 +68,32 @@ def test_two_twins_of_all_together_do_not_make_noise_seen_before_small():
 
 def test_what_is_plainly_missed_need_not_be_simulated_without():
     """A dead time that is there, and one that another effect has come to stand for, so that both are too much."""
-    case, there = recorded(effect("dead_time", tau_us=0.5)), null()
-    measured = values_of(case.bank, there.keys)
-    found = fit(Problem(case, MODEL, there, measured, measured), "dead_time", {"tau_us": 0.5})
-    change = found.prediction.mean - there.mean
+    case, without = recorded(effect("dead_time", tau_us=0.5)), null()
+    measured = values_of(case.bank, without.keys)
+    found = fit(Problem(case, MODEL, without, measured, measured), "dead_time", {"tau_us": 0.5})
+    change = found.prediction.mean - without.mean
     twice = replace(found.prediction, mean=found.prediction.mean + change)
-    both = replace(found, prediction=twice, misfit=residual_and_misfit(there, measured, twice)[1])
+    both = replace(found, prediction=twice, misfit=residual_and_misfit(without, measured, twice)[1])
     print(found.misfit, both.misfit)
-    problem = Problem(case, MODEL, there, measured, measured)
+    problem = Problem(case, MODEL, without, measured, measured)
     assert is_missed(problem, found, change)
     assert not is_missed(problem, found, 0.1 * change)
     assert not is_missed(problem, both, change)
 
 
 def test_more_twins_say_whether_something_is_left_where_two_cannot():
-    """Statistics 50 noises off: of two twins that happened to scatter by four it is nothing, by all twelve it is a lot.
-    What suits well needs no more."""
-    case, there = recorded(effect("dead_time", tau_us=0.5)), null()
-    measured = values_of(case.bank, there.keys)
-    found = fit(Problem(case, MODEL, there, measured, measured), "dead_time", {"tau_us": 0.5})
-    two = predict_by_twins(case, found.model, found.base, there, 2)
-    found = replace(found, prediction=replace(two, spread=4.0 * there.sd))
+    """Statistics 50 noises off: by two twins that happened to scatter by four this is chance, by all twelve it is not.
+    A good fit needs no more twins."""
+    case, without = recorded(effect("dead_time", tau_us=0.5)), null()
+    measured = values_of(case.bank, without.keys)
+    found = fit(Problem(case, MODEL, without, measured, measured), "dead_time", {"tau_us": 0.5})
+    two = predict_by_twins(case, found.model, found.base, without, 2)
+    found = replace(found, prediction=replace(two, spread=4.0 * without.sd))
     suits = found.prediction.mean
-    assert try_more_draws(Problem(case, MODEL, there, suits, suits), found) is found
-    off = suits + np.where([k.group == "timing" for k in there.keys], 50.0 * there.sd, 0.0)
-    sure = try_more_draws(Problem(case, MODEL, there, off, off), found)
-    left = [is_significant(there, residual(there, off, f.prediction), f.prediction) for f in (found, sure)]
+    assert try_more_draws(Problem(case, MODEL, without, suits, suits), found) is found
+    off = suits + np.where([k.group == "timing" for k in without.keys], 50.0 * without.sd, 0.0)
+    sure = try_more_draws(Problem(case, MODEL, without, off, off), found)
+    left = [is_significant(without, residual(without, off, f.prediction), f.prediction) for f in (found, sure)]
     print(left, len(sure.prediction.draws))
     assert left == [False, True]
     assert len(sure.prediction.draws) == TWINS and sure.model == found.model
@@ -102,21 +102,28 @@ def test_more_twins_say_whether_something_is_left_where_two_cannot():
 
 def test_a_column_that_few_units_have_is_no_surprise_to_many():
     """Columns of 100 mV, one of them 3 deviations off: none of the first two dozen units has pixels that far out; of
-    240 some have.  What is left in no unit's reach is left."""
-    case, there = recorded(effect("column_fixed_pattern", sigma_mV=100.0)), null()
+    240 some have.  A larger deviation is still left."""
+    case, without = recorded(effect("column_fixed_pattern", sigma_mV=100.0)), null()
     model = with_effect(MODEL, "column_fixed_pattern", {"sigma_mV": 100.0})
     found = Fit(
-        "column_fixed_pattern", {}, {}, there.prediction, constrained_refit(model, case.base), there.mean, 0.0, model
+        "column_fixed_pattern",
+        {},
+        {},
+        without.prediction,
+        constrained_refit(model, case.base),
+        without.mean,
+        0.0,
+        model,
     )
-    found = confirmed(Problem.of(case, MODEL, there, values_of(case.bank, there.keys)), found)
-    few, many = found.prediction, with_drawn_pattern(case, model, there, there.prediction, 240)
-    at = next(i for i, k in enumerate(there.keys) if k.name == "over 5" and k.recording == "flat-0.2")
+    found = confirmed(Problem.of(case, MODEL, without, values_of(case.bank, without.keys)), found)
+    few, many = found.prediction, with_drawn_pattern(case, model, without, without.prediction, 240)
+    at = next(i for i, k in enumerate(without.keys) if k.name == "over 5" and k.recording == "flat-0.2")
     tops = [float(np.max(p.units[:, at])) for p in (few, many)]
-    values = np.where(np.arange(len(there.keys)) == at, np.nextafter(tops[1], 0.0), few.mean)
-    sure = try_more_draws(Problem(case, MODEL, there, values, values), found)
+    values = np.where(np.arange(len(without.keys)) == at, np.nextafter(tops[1], 0.0), few.mean)
+    sure = try_more_draws(Problem(case, MODEL, without, values, values), found)
     print(f"of {len(few.units)} units {tops[0]:.1f}, of {len(sure.prediction.units)} {tops[1]:.1f}")
     assert tops[1] > tops[0]
-    left = [is_significant(there, residual(there, values, f.prediction), f.prediction) for f in (found, sure)]
+    left = [is_significant(without, residual(without, values, f.prediction), f.prediction) for f in (found, sure)]
     assert left == [True, False]
     off = np.where(np.arange(len(values)) == at, 10 * tops[1], sure.prediction.mean)
-    assert is_significant(there, residual(there, off, sure.prediction), sure.prediction)
+    assert is_significant(without, residual(without, off, sure.prediction), sure.prediction)

@@ -87,7 +87,7 @@ def test_what_one_parameter_moves_says_how_far_another_of_its_effect_does():
 def test_shapes_are_told_by_steps_that_suit_them():
     """A time constant by half a logarithm, the level from which light spills by a tenth; each is open by twice that."""
     free = [("blooming", "share"), ("blooming", "full"), ("incomplete_reset", "tau_us"), WHITE]
-    assert [derivative_step(*what, peak=12.0) for what in free] == [0.5, -0.1, -0.5, -0.2]
+    assert [derivative_step(*parameter, peak=12.0, shows=6.0) for parameter in free] == [0.5, -0.1, -0.5, -0.2]
     assert list(prior_sd(free)) == [1.0, 0.2, 1.0, 1.0]
 
 
@@ -142,7 +142,7 @@ def test_steps_go_on_while_they_are_worth_their_twins():
 
 
 def test_a_step_that_removed_nothing_is_the_last_but_one():
-    """A camera that promises by its derivatives what it never gives."""
+    """A camera whose derivatives promise a change that no step makes."""
     n = null()
     measured, here, looks = n.mean + law(**TRUE), parameters_of(start(fraction=0.5, tau_us=1.0)), []
 

@@ -18,7 +18,7 @@ NOTHING = Prediction(np.zeros(0), np.zeros(0), np.zeros(0))
 
 @pytest.mark.parametrize("seed", [1, 12])
 def test_noise_of_the_unit_is_found_beside_common_noise(seed):
-    """3 mV in common take a fifth of what the refit holds for the unit's own."""
+    """3 mV in common take a fifth of the noise that the refit assigns to the unit."""
     name = "common_threshold_noise"
     case = recorded(effect(name, sigma_mV=3.0), seed=seed)
     values = values_of(case.bank, null().keys)

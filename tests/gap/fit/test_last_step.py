@@ -1,4 +1,4 @@
-"""Errors of a fit that the budget left where it was: they say what the steps not taken would have found."""
+"""Errors of a fit that the budget stopped: they contain the steps that were not taken."""
 
 from __future__ import annotations
 
@@ -33,9 +33,10 @@ STOPPED_AT = [(1.0, 1.0), (1.3, 1.0), (0.75, 1.4), (1.35, 0.6)]
 
 @dataclass(frozen=True, eq=False)
 class ByLaw(Problem):
-    """One recording of which twins follow the law without chance.  simulated: how often they were asked for."""
+    """One recording whose twins follow the law without chance."""
 
     simulated: list[int] = field(default_factory=list)
+    """Number of twins of each prediction."""
 
     def predict(self, model, base, count, only=None) -> Prediction:
         self.simulated.append(count)
@@ -115,7 +116,7 @@ def test_errors_of_a_fit_that_is_left_cost_a_twin_a_parameter_and_one():
 
 
 def test_a_fit_too_far_off_for_one_step_says_so():
-    """Half of the strength: the rest of what one step may not take, and its curvature, are in the error."""
+    """Half of the strength: the part that one step may not take, and its curvature, are in the error."""
     problem = campaign(1, limit=0.0)
     far = estimates(after_the_search(problem, stopped(problem, 0.5, 1.0)))["fraction"]
     print(far)

@@ -67,13 +67,13 @@ def test_more_parameters_are_not_fitted_where_fewer_leave_nothing():
 
 
 def test_of_other_shapes_the_best_is_fitted_whole_where_it_removes_nearly_as_much():
-    """Lag of 1 ms from 0.6 and from 8 ms, where its strength alone removes most of what it does at 1 ms, or some."""
+    """Lag of 1 ms from 0.6 and from 8 ms, where its strength alone removes most of the misfit, or some of it."""
     case = recorded(effect("photodiode_lag", fraction=0.08, tau_us=1000.0))
     measured = values_of(case.bank, null().keys)
     before = residual_and_misfit(null(), measured, null().prediction)[1]
     best = fit(Problem(case, MODEL, null(), measured, measured), "photodiode_lag", {"fraction": 0.08, "tau_us": 1000.0})
     tried = [{"fraction": 0.08, "tau_us": tau_us} for tau_us in (600.0, 8000.0)]
-    starts = [Screened("photodiode_lag", there, best.misfit, np.full(len(measured), np.inf)) for there in tried]
+    starts = [Screened("photodiode_lag", start, best.misfit, np.full(len(measured), np.inf)) for start in tried]
     began = replace(starts[0], start=best.parameters)
     problem = Problem(case, MODEL, null(), measured, measured)
     found = try_other_starts(problem, best, before, [began, *starts], {began: best})
@@ -82,4 +82,4 @@ def test_of_other_shapes_the_best_is_fitted_whole_where_it_removes_nearly_as_muc
     spent = case.budget.simulated
     tries = {began: best, starts[0]: replace(best, misfit=before)}
     assert try_other_starts(problem, best, before, [began, starts[0]], tries) == []
-    assert case.budget.simulated == spent, "what was fitted from there before is not fitted again"
+    assert case.budget.simulated == spent, "a start that was fitted is not fitted again"

@@ -27,7 +27,7 @@ def test_a_template_is_taken_at_every_combination_of_shapes(name):
 
 @pytest.mark.parametrize("noises", [4.0, 20.0, 400.0])
 def test_a_template_shows_by_40_noises_in_recordings_to_fit(monkeypatch, noises):
-    """A made-up effect in proportion to its strength; what it moves most is held out, and does not count."""
+    """A made-up effect in proportion to its strength; its largest statistic is held out, and does not count."""
     [start] = template_parameters("dead_time")
     key = CATALOGUE["dead_time"].strength
 

@@ -1,4 +1,4 @@
-"""The search among maps on made-up fits: what is added, how often, and what counts as there in the end."""
+"""The search among maps on made-up fits: effects that are added, their number, and their significance."""
 
 from __future__ import annotations
 

@@ -40,10 +40,10 @@ FIT = np.arange(COUNT) < 150
 
 @dataclass(frozen=True)
 class OfAll:
-    """What of a case a search asks, where all statistics are to be fitted."""
+    """The part of a case that a search uses, where all statistics are to be fitted."""
 
-    budget: Budget
-    conditions: tuple[None, ...]
+    budget: Budget = field(default_factory=Budget)
+    conditions: tuple[None, ...] = ()
     base: BaseFit = field(default_factory=unit)
     observations: tuple[None, ...] = ()
     scenes_only: bool = False
@@ -74,6 +74,21 @@ def campaign():
     return n, effect, values, np.where(FIT, values, np.nan)
 
 
+def selected(case, n: Null, values, monkeypatch, joined=lambda _problem, rounds, _chance: list(rounds)) -> list[Round]:
+    """Rounds of a search whose joint fit is `joined`, and which tries no two bends that cancel."""
+    monkeypatch.setattr(search, "joined", joined)
+    monkeypatch.setattr(search, "try_cancelling_pair", lambda _problem, _names, rounds: rounds)
+    return search.forward_selection(Problem.of(case, MODEL, n, values), [], None)
+
+
+def only_polish(polish, monkeypatch) -> None:
+    """A joint fit by `polish`, without tests of earlier effects."""
+    for module in (search, neighbours):
+        monkeypatch.setattr(module, "refined_together", polish)
+    monkeypatch.setattr(search, "try_without_earlier", lambda problem, best, earlier: best)
+    monkeypatch.setattr(search, "try_in_place_of_earlier", lambda problem, best, turn: (best, turn))
+
+
 def test_recordings_held_out_decide_between_what_the_others_cannot_tell_apart():
     """A twin that is a little better on the recordings to fit, and wrong on those held out."""
     n, effect, values, seen = campaign()
@@ -85,7 +100,7 @@ def test_recordings_held_out_decide_between_what_the_others_cannot_tell_apart():
 
 
 def test_what_loses_little_and_wins_all_recordings_is_chosen():
-    """The true one wins by far on what is held out, and loses by more than chance on the others."""
+    """The true one wins by far on held-out recordings, and loses by more than chance on the others."""
     n, effect, values, seen = campaign()
     nudge = np.where(np.arange(COUNT) < 50, 0.18 * (values - n.mean - effect), 0.0)
     true, twin = a_fit(n, "dead_time", effect, seen), a_fit(n, "ir_drop", np.where(FIT, effect + nudge, 0.0), seen)
@@ -117,7 +132,7 @@ def test_what_all_recordings_together_cannot_tell_apart_are_rivals():
 
 @pytest.mark.parametrize(("better", "first"), [(0.0, "dead_time"), (20.0, "incomplete_reset")])
 def test_a_parameter_more_has_to_explain_more(better, first):
-    """An incomplete reset, whose time constant is free, with the change of a dead time, and once with what it lacks."""
+    """An incomplete reset, whose time constant is free, with the change of a dead time, and once with the rest."""
     n, effect, values, seen = campaign()
     nudge = np.where((np.arange(COUNT) >= 50) & (np.arange(COUNT) < 60), better * n.sd, 0.0)
     simple = a_fit(n, "dead_time", effect, seen + nudge)
@@ -127,7 +142,7 @@ def test_a_parameter_more_has_to_explain_more(better, first):
 
 
 def test_what_has_a_parameter_more_is_a_rival_where_it_leaves_more_than_that_less():
-    """An incomplete reset with the change of a dead time and ever more of what that lacks."""
+    """An incomplete reset with the change of a dead time and ever more of the rest."""
     n, effect, values, seen = campaign()
     told = []
     for better in np.linspace(0.0, 1.0, 21):
@@ -136,14 +151,8 @@ def test_what_has_a_parameter_more_is_a_rival_where_it_leaves_more_than_that_les
         richer = a_fit(n, "incomplete_reset", effect + nudge, seen + nudge)
         ahead = lead(n, values + nudge, richer.prediction, simple.prediction)
         if 0 < ahead < DEVIANCE.tie:
-            told.append(
-                (
-                    ahead,
-                    chosen_of(Problem(recorded(), MODEL, n, seen + nudge, values + nudge), n.draws, [richer, simple])[
-                        1
-                    ],
-                )
-            )
+            problem = Problem(recorded(), MODEL, n, seen + nudge, values + nudge)
+            told.append((ahead, chosen_of(problem, n.draws, [richer, simple])[1]))
     print([(round(ahead, 2), rivals) for ahead, rivals in told])
     assert {rivals for ahead, rivals in told if ahead < PER_PARAMETER} == {()}
     assert {rivals for ahead, rivals in told if ahead > PER_PARAMETER} == {("incomplete_reset",)}
@@ -214,7 +223,7 @@ def test_a_round_in_which_nothing_promises_enough_is_one_without_a_choice(monkey
 
 
 def test_beside_what_was_found_a_hint_is_enough_to_be_confirmed(monkeypatch):
-    """What came first may have taken the share of what comes later: how much both remove, only both together tell."""
+    """The first effect may have taken the share of a later one: only both together show how much they remove."""
     n, _effect, values, seen = campaign()
     rho, before = residual_and_misfit(n, seen, n.prediction)
     hint = replace(a_fit(n, "crosstalk", 4.0 * n.sd, seen), misfit=before - (DEVIANCE.accept + search.JOIN) / 2)
@@ -242,10 +251,7 @@ def test_a_later_effect_of_little_is_polished_together_with_the_first(monkeypatc
         asked.append(list(names))
         return found, {}, False
 
-    for module in (search, neighbours):
-        monkeypatch.setattr(module, "refined_together", polish)
-    monkeypatch.setattr(search, "try_without_earlier", lambda problem, best, earlier: best)
-    monkeypatch.setattr(search, "try_in_place_of_earlier", lambda problem, best, turn: (best, turn))
+    only_polish(polish, monkeypatch)
     joined(Problem(recorded(), MODEL, n, seen, values), [first, replace(first, misfit=left, fits=(little,))], 0.0)
     assert asked == [["dead_time", "crosstalk"]]
     asked.clear()
@@ -336,10 +342,7 @@ def test_what_leaves_something_is_put_against_its_runner_up_when_all_is_polished
         asked.append(tuple(names))
         return of_two(n, found.name, polished[found.name], seen), {found.name: {"x": 0.1}}, False
 
-    for module in (search, neighbours):
-        monkeypatch.setattr(module, "refined_together", polish)
-    monkeypatch.setattr(search, "try_without_earlier", lambda problem, best, earlier: best)
-    monkeypatch.setattr(search, "try_in_place_of_earlier", lambda problem, best, turn: (best, turn))
+    only_polish(polish, monkeypatch)
     *_, last = joined(Problem(recorded(), MODEL, n, seen, values), [first, second], 0.0)
     assert asked == [("dead_time", "light_flicker"), ("dead_time", "supply_ripple")]
     assert [f.name for f in last.fits] == ["supply_ripple", "light_flicker"] and last.rivals == ()
@@ -358,11 +361,11 @@ def test_a_runner_up_that_explained_little_or_was_not_confirmed_is_not_tried_aga
     assert [f.name for f in runner_up(turn, names, 0.8)] == ["supply_ripple"]
     guess = replace(near, prediction=replace(near.prediction, draws=()))
     assert runner_up(replace(turn, fits=(best, far, guess)), names, 0.8) == []
-    assert runner_up(turn, ["lamp_drift", "light_flicker"], 0.8) == [], "what was found before is another one now"
+    assert runner_up(turn, ["lamp_drift", "light_flicker"], 0.8) == [], "the earlier effect is another one now"
 
 
 def test_a_stand_in_that_makes_recordings_held_out_worse_is_not_kept():
-    """It takes the effect up where it was fitted; on what was held out it does nothing, or the opposite."""
+    """It takes the effect up where it was fitted; on held-out recordings it does nothing, or the opposite."""
     n, change, values, seen = campaign()
     case = SimpleNamespace(held_out=lambda keys: ~FIT, conditions=())
     start = Round(MODEL, unit(), n.prediction, change, 800.0)
@@ -376,7 +379,7 @@ def test_a_stand_in_that_makes_recordings_held_out_worse_is_not_kept():
 
 @pytest.mark.parametrize("spoils", [True, False])
 def test_rounds_end_with_the_last_that_explains(spoils: bool):
-    """A second effect that takes what is left is kept; one that moves what agreed is not."""
+    """A second effect that takes the rest is kept; one that moves statistics that agreed is not."""
     n, change, values, seen = campaign()
     case = SimpleNamespace(held_out=lambda keys: ~FIT, conditions=())
     one, two = MODEL.with_effect(DEAD_TIME), MODEL.with_effect(DEAD_TIME).with_effect(effect("optical_blur"))
@@ -391,8 +394,8 @@ def test_rounds_end_with_the_last_that_explains(spoils: bool):
 
 @pytest.mark.parametrize(("takes", "named"), [(0.1, False), (0.2, False), (0.4, True), (1.0, True)])
 def test_beside_a_remainder_an_effect_is_named_that_takes_most_of_it(takes: float, named: bool):
-    """A law that differs in details leaves most of what it changed in few statistics, of which others take a share:
-    half of a sum of squares is 0.29 of what is left of each."""
+    """A law that differs in details leaves much in few statistics, of which other effects take a share.
+    Half of a sum of squares is 0.29 of each deviation."""
     n, change, values, seen = campaign()
     values, details = values + 15.0 * change, np.where(np.arange(COUNT) < 3, 0.6, 0.0)
     seen = np.where(FIT, values, np.nan)
@@ -412,8 +415,8 @@ def test_beside_a_remainder_an_effect_is_named_that_takes_most_of_it(takes: floa
 
 @pytest.mark.parametrize(("left", "off"), [(0.0, False), (0.6, True), (1.0, True)])
 def test_beside_an_effect_a_parameter_is_off_only_if_the_given_one_leaves_more(left: float, off: bool, monkeypatch):
-    """left: of three statistics that the effect changes, what it leaves with the parameters as given.  With the unit's
-    own it leaves nothing."""
+    """left: the share that the effect leaves of three statistics with the nominal parameters.  With the unit's own it
+    leaves nothing."""
     n, change, values, seen = campaign()
     values = values + 15.0 * change
     noisy = exact_refit(MODEL.with_effect(effect("reset_noise", sigma_mV=25.0)).draw_unit((128, 128), 5))
@@ -433,16 +436,13 @@ def test_what_explains_nothing_any_more_once_polished_is_not_added(keeps: bool, 
     n, effect, values, _ = campaign()
     found = replace(a_fit(n, "dead_time", effect, values), model=MODEL.with_effect(DEAD_TIME))
     faded = replace(found, prediction=n.prediction, misfit=residual_and_misfit(n, values, n.prediction)[1])
-    case = OfAll(budget=Budget(), conditions=())
 
     def polished(*given):
         *before, last = given[1]
         return [*before, replace(last, fits=(found if keeps else faded, *last.fits[1:]))]
 
     monkeypatch.setattr(search, "with_candidates", lambda *given: replace(given[-1], fits=(found,)))
-    monkeypatch.setattr(search, "joined", polished)
-    monkeypatch.setattr(search, "try_cancelling_pair", lambda _problem, _names, rounds: rounds)
-    rounds = search.forward_selection(Problem.of(case, MODEL, n, values), [], None)
+    rounds = selected(OfAll(), n, values, monkeypatch, joined=polished)
     assert rounds[-1].model is (found.model if keeps else MODEL)
 
 
@@ -460,12 +460,10 @@ def test_a_second_effect_is_begun_where_enough_effort_is_left_for_it(spent: int,
         return replace(given[-1], fits=(found,) if len(asked) == 1 else ())
 
     monkeypatch.setattr(search, "with_candidates", compared)
-    monkeypatch.setattr(search, "joined", lambda *given: given[1])
-    monkeypatch.setattr(search, "try_cancelling_pair", lambda _problem, _names, rounds: rounds)
     monkeypatch.setattr(search, "is_significant", lambda *_: True)
     monkeypatch.setattr(search, "is_small_share", lambda *_: False)
     n = replace(n, settings=DiagnosisSettings(searching=Searching(campaigns_per_effect=17)))
-    search.forward_selection(Problem.of(case, MODEL, n, values), [], None)
+    selected(case, n, values, monkeypatch)
     assert len(asked) == 1 + begun and case.budget.left_out == ([] if begun else ["a second effect"])
 
 
@@ -477,11 +475,8 @@ def test_dark_levels_are_open_beside_the_noise_of_an_effect(share: float, opened
     found = replace(found, base=replace(unit(), white=share * unit().white))
     asked = []
     monkeypatch.setattr(search, "with_candidates", lambda *given: replace(given[-1], fits=(found,)))
-    monkeypatch.setattr(search, "joined", lambda *given: given[1])
     monkeypatch.setattr(search, "with_dark_levels_open", lambda *given: asked.append(given) or given[-1])
-    monkeypatch.setattr(search, "try_cancelling_pair", lambda _problem, _names, rounds: rounds)
-    case = OfAll(budget=Budget(), conditions=())
-    search.forward_selection(Problem.of(case, MODEL, n, values), [], None)
+    selected(OfAll(), n, values, monkeypatch)
     assert bool(asked) == opened
 
 
@@ -491,15 +486,12 @@ def test_an_effect_that_fades_to_nothing_is_not_added(strength: float, added: bo
     model = MODEL.with_effect(effect("dead_time", tau_us=strength))
     found = replace(a_fit(n, "dead_time", change, values), model=model)
     monkeypatch.setattr(search, "with_candidates", lambda *given: replace(given[-1], fits=(found,)))
-    monkeypatch.setattr(search, "joined", lambda *given: given[1])
-    monkeypatch.setattr(search, "try_cancelling_pair", lambda _problem, _names, rounds: rounds)
-    case = OfAll(budget=Budget(), conditions=())
-    rounds = search.forward_selection(Problem.of(case, MODEL, n, values), [], None)
+    rounds = selected(OfAll(), n, values, monkeypatch)
     assert (rounds[-1].model is model) == added
 
 
 def test_a_second_effect_is_looked_for_beside_one_that_takes_little(monkeypatch):
-    """The first removes a twentieth of what is beyond chance."""
+    """The first removes a twentieth of the misfit beyond chance."""
     n, change, values, _ = campaign()
     asked = []
 
@@ -513,10 +505,7 @@ def test_a_second_effect_is_looked_for_beside_one_that_takes_little(monkeypatch)
     monkeypatch.setattr(search, "has_candidate", lambda *_: True)
     monkeypatch.setattr(search, "is_improvement", lambda *_: True)
     monkeypatch.setattr(search, "is_significant", lambda *_: True)
-    monkeypatch.setattr(search, "joined", lambda *given: given[1])
-    monkeypatch.setattr(search, "try_cancelling_pair", lambda _problem, _names, rounds: rounds)
-    case = OfAll(budget=Budget(), conditions=())
-    search.forward_selection(Problem.of(case, MODEL, n, values), [], None)
+    selected(OfAll(), n, values, monkeypatch)
     assert len(asked) == 2
 
 
@@ -535,15 +524,7 @@ def test_a_runner_up_of_an_earlier_round_has_to_have_removed_half_of_what_its_ef
 def test_four_runners_up_are_tried_in_place_of_an_earlier_effect_at_most(monkeypatch):
     n, change, values, seen = campaign()
     best = of_two(n, "crosstalk", change, seen)
-    names = (
-        "dead_time",
-        "comparator_delay",
-        "ir_drop",
-        "readout_skew",
-        "optical_blur",
-        "missed_spikes",
-        "afterpulsing",
-    )
+    names = ("dead_time", "comparator_delay", "ir_drop", "readout_skew", "optical_blur", "missed_spikes")
     turn = Round(MODEL, unit(), n.prediction, values, 500.0, tuple(replace(best, name=m, misfit=300.0) for m in names))
     asked = []
     monkeypatch.setattr(neighbours, "confirmed", lambda problem, found: found)
@@ -571,7 +552,4 @@ def test_three_effects_are_looked_for_at_most(monkeypatch):
     monkeypatch.setattr(search, "is_improvement", lambda *_: True)
     monkeypatch.setattr(search, "is_significant", lambda *_: True)
     monkeypatch.setattr(search, "is_small_share", lambda *_: False)
-    monkeypatch.setattr(search, "joined", lambda _problem, rounds, _chance: list(rounds))
-    monkeypatch.setattr(search, "try_cancelling_pair", lambda _problem, _names, rounds: rounds)
-    case = OfAll(budget=Budget(), conditions=())
-    assert len(search.forward_selection(Problem.of(case, MODEL, n, values), [], None)) == 3 + 1
+    assert len(selected(OfAll(), n, values, monkeypatch)) == 3 + 1

@@ -101,7 +101,7 @@ def simulated(n: Null, change: np.ndarray, seed: int, own: float = 0.7) -> Predi
 
 
 def test_two_laws_that_do_the_same_are_rivals_though_twins_differ():
-    """What twins of the second happen to do is no part of its law: taken for it, every lead above TIE would tell.
+    """Chance of the second's twins is no part of its law: taken for it, every lead above TIE would decide.
     At 1 % doubt two of 200 are missed, and some more because twins also scatter further than CLEAR."""
     missed = leads = 0
     for seed in range(200):

@@ -1,4 +1,4 @@
-"""What a round's effect has to show, and how much it has to remove, for the search to go on."""
+"""The change that a round's effect has to make, and the misfit that it has to remove, for the search to go on."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ def test_less_than_a_fifth_of_what_is_beyond_chance_is_little_and_later_less_tha
 
 
 @pytest.mark.parametrize(
-    "name, parameters, there",
+    "name, parameters, present",
     [
         ("dead_time", {"tau_us": 0.0}, False),
         ("dead_time", {"tau_us": 1e-4}, True),
@@ -52,9 +52,9 @@ def test_less_than_a_fifth_of_what_is_beyond_chance_is_little_and_later_less_tha
         ("hot_pixels", {"fraction": 0.8 / PIXELS, "mean_pA": 3.0}, True),
     ],
 )
-def test_an_effect_of_no_strength_or_of_less_than_half_a_pixel_is_absent(name, parameters, there):
+def test_an_effect_of_no_strength_or_of_less_than_half_a_pixel_is_absent(name, parameters, present):
     model = MODEL.with_effect(effect(name, **parameters))
-    assert absent(recorded(), MODEL, model) == (set() if there else {name})
+    assert absent(recorded(), MODEL, model) == (set() if present else {name})
     assert absent(recorded(), model, model) == set(), "of the model given"
 
 

@@ -1,4 +1,4 @@
-"""Which candidates are fitted, by what their templates leave."""
+"""Candidates that are fitted, by the misfit of their templates."""
 
 from __future__ import annotations
 

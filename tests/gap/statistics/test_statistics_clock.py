@@ -7,7 +7,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from spikecam_env.calibration.real import ideal_second_difference
+from spikecam_env.calibration.spike_times import ideal_second_difference
 from spikecam_env.gap.observe.observation import DIFFERENCES
 from spikecam_env.gap.statistics import StatisticKey, floor_of
 from spikecam_env.gap.statistics.clock import bands, statistics

@@ -1,4 +1,4 @@
-"""Upper bounds: what these recordings refute, and nothing that they cannot."""
+"""Upper bounds: strengths that these recordings refute, and no others."""
 
 from __future__ import annotations
 
@@ -157,7 +157,7 @@ class Linear:
 
 
 NOTHING = np.zeros(1)
-"""A measurement that scores what is usual."""
+"""A measurement that scores the mean without the effect."""
 
 
 @pytest.mark.parametrize("start, at", [(0.07, 0.07), (0.2, 0.2), (0.05, 0.12), (0.3, 0.12), (0.12 / 1000, 0.12)])
@@ -178,7 +178,7 @@ def test_what_never_shows_by_half_of_that_has_no_bound(per: float, known: bool) 
 
 
 def test_the_least_refuted_strength_is_bracketed() -> None:
-    """Refuted is what shows by two noises; the first is tested at 1.2 times what the score lets expect, 1.8 noises."""
+    """Strengths that show by two noises are refuted; the first test is at 1.2 times the expected bound, 1.8 noises."""
     probe = Linear(100.0)
     found = bound_of(NOTHING, ScoredShape(probe, probe.score({"tau_us": 0.12}), 0.0))
     print(found, probe.tests)

@@ -1,4 +1,4 @@
-"""A parameter of the model is not called off beside what is unexplained, nor for what a named effect scatters."""
+"""A parameter of the model is not called off beside an unexplained rest, nor if a named effect scatters it as far."""
 
 from __future__ import annotations
 
@@ -23,8 +23,12 @@ LITTLE = 0.15
 
 
 def conclusion(left: float = 0.0, read: float = 1.0):
-    """Of a unit whose s^2 is five times nominal, beside a dead time that leaves such a share of the largest deviate in
-    the quietest statistic beside it, and of whose twins the refit reads `read` times the unit's s^2."""
+    """The conclusion on a unit whose s^2 is five times nominal, with a dead time.
+
+    Args:
+        left: share of the largest deviate that the fit leaves in the quietest statistic beside it.
+        read: s^2 that the refit of a twin reads, over the unit's.
+    """
     found = effect("dead_time", tau_us=0.5)
     null, model, case = small.null(), small.MODEL.with_effect(found), recorded(found)
     values = values_of(case.bank, null.keys)

@@ -1,4 +1,4 @@
-"""What a name may leave: little beside what was there, in the same group of statistics of the same recording."""
+"""The largest remainder of a name: a small share of the distance in the same group of statistics and recording."""
 
 from __future__ import annotations
 
@@ -35,9 +35,9 @@ def given(mean: np.ndarray) -> Prediction:
 @pytest.mark.parametrize("share, explained", [(0.03, True), (0.18, True), (0.4, False)])
 def test_a_name_leaves_a_quarter_of_the_squares_of_a_group_at_most(share: float, explained: bool) -> None:
     """20 statistics of 100 noises go, and in one beside that stays which the name does not move."""
-    there = off(rates_flat=100.0)
-    stays = float(np.sqrt(share / (1.0 - share) * np.sum(there**2)))
-    assert explains(NULL, there + beside(rates_flat=stays), given(there)) == explained
+    before = off(rates_flat=100.0)
+    stays = float(np.sqrt(share / (1.0 - share) * np.sum(before**2)))
+    assert explains(NULL, before + beside(rates_flat=stays), given(before)) == explained
 
 
 @pytest.mark.parametrize("share, explained", [(0.03, True), (0.08, False)])
@@ -53,9 +53,9 @@ def test_a_name_leaves_a_twentieth_of_the_deviance_at_most(share: float, explain
 
 
 def test_what_is_left_is_not_measured_by_how_well_laws_are_known() -> None:
-    """Of a law good to TOLERANCE: 60 % of what was there is its errors times 30, and far from little."""
-    there = off(rates_flat=1000.0)
-    assert not explains(NULL, there, given(0.4 * there)) and pytest.approx(30.0) == 600.0 / (TOLERANCE * 400.0)
+    """A law is good to TOLERANCE: 60 % of the distance is its error times 30, and no small share."""
+    before = off(rates_flat=1000.0)
+    assert not explains(NULL, before, given(0.4 * before)) and pytest.approx(30.0) == 600.0 / (TOLERANCE * 400.0)
 
 
 @pytest.mark.parametrize("noises", [0.0, 3.0])
@@ -78,8 +78,10 @@ def test_what_agreed_before_is_contradicted() -> None:
 
 
 def test_a_remainder_says_how_much_and_where() -> None:
-    there, left = off(rates_flat=100.0, drift_dark=300.0), beside(rates_flat=6.0, drift_dark=-8.0)
-    found = remainder_of(NULL, there + left, given(there), where="rows 0-20", when="until about half of each recording")
+    before, left = off(rates_flat=100.0, drift_dark=300.0), beside(rates_flat=6.0, drift_dark=-8.0)
+    found = remainder_of(
+        NULL, before + left, given(before), where="rows 0-20", when="until about half of each recording"
+    )
     assert found is not None
     print(found)
     assert found.noises == pytest.approx(8.0) and found.worst == "drift: 24"
@@ -90,7 +92,7 @@ def test_a_remainder_says_how_much_and_where() -> None:
 
 
 def test_the_share_of_a_remainder_is_of_squares_beyond_chance() -> None:
-    there, left = off(rates_flat=100.0), beside(rates_flat=15.0)
-    found = remainder_of(NULL, there + left, given(there))
+    before, left = off(rates_flat=100.0), beside(rates_flat=15.0)
+    found = remainder_of(NULL, before + left, given(before))
     assert found is not None
     assert found.share == pytest.approx((15.0**2 - COUNT) / (20 * 100.0**2 + 15.0**2 - COUNT))

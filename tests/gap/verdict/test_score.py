@@ -1,4 +1,4 @@
-"""Scores: what campaigns with an effect at a strength score, and when a strength is refuted."""
+"""Scores of campaigns with an effect at a strength, and the refutation of a strength."""
 
 from __future__ import annotations
 

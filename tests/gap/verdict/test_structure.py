@@ -1,4 +1,4 @@
-"""What an unexplained discrepancy looks like, in numbers."""
+"""The description of an unexplained discrepancy, in numbers."""
 
 from __future__ import annotations
 
@@ -58,4 +58,4 @@ def test_what_many_pixels_have_in_common_has_its_share_of_the_deviance(rows, ext
     found = structure(case, null, off)
     assert found["extent"] == extent
     assert {"light", "level_exponent", "extent", "history", "neighbours", "clock", "where", "when"} <= set(found)
-    assert set(found) - {"worst_group", "groups"} <= set(STRUCTURE), "what has no words on the page"
+    assert set(found) - {"worst_group", "groups"} <= set(STRUCTURE), "without words on the page"

@@ -1,4 +1,4 @@
-"""The verdict of made-up comparisons: limits of what may be chance, and of what may be left."""
+"""The verdict of made-up comparisons: limits of chance, and of the remainder."""
 
 from __future__ import annotations
 

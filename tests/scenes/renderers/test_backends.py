@@ -14,12 +14,12 @@ import numpy as np
 import pytest
 import trimesh
 
+from benchmarks.renderers import compare_backends, objects
 from scenes.renderers import choose
 from scenes.renderers.choose import BACKENDS, choose_renderer
 from scenes.renderers.embree import Embree
 from scenes.renderers.opengl import OpenGL
 from scenes.renderers.protocol import Lighting, PictureWindow, Pinhole, Renderer, Sprite, Surface
-from spikecam_env.bench.renderers import compare_backends, objects
 from spikecam_env.errors import InputError, NotReadyError
 
 WINDOW = PictureWindow(0, 0, 60, 80)

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 from numpy.typing import NDArray
 
-from spikecam_env.calibration.real import ideal_second_difference
+from spikecam_env.calibration.spike_times import ideal_second_difference
 from spikecam_env.gap.observe.observation import ObservedRecording
 from spikecam_env.gap.report.panels import PlotPanel, takes
 from spikecam_env.gap.result import Evidence

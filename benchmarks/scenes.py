@@ -1,18 +1,22 @@
-"""How fast scenes are, how far their light is from the truth, and whether their flow is right.
+"""Speed of scenes, error of their light, and error of their flow.
 
-spikecam bench scenes
+python -m benchmarks.scenes
 """
 
 from __future__ import annotations
 
 import time
 from collections.abc import Iterable
+from pathlib import Path
 from typing import Any
 
 import numpy as np
+import tyro
 from numpy.typing import NDArray
 from tqdm import tqdm
 
+from benchmarks.exact_disk import supersampled
+from benchmarks.renderers import EXACT_RAYS, bench_renderers
 from scenes.catalogue import SCENES, make_scene
 from scenes.collage import Collage
 from scenes.disk import RotatingDisk, disk_texture
@@ -21,14 +25,13 @@ from scenes.keys import side_by_side
 from scenes.protocol import Scene
 from scenes.sliding import SlidingTexture
 from scenes.world import World
-from spikecam_env.bench.exact_disk import supersampled
 from spikecam_env.bench.machine import FRAME_RATE_HZ, SHAPE
-from spikecam_env.bench.renderers import EXACT_RAYS, bench_renderers
+from spikecam_env.cli.bench import print_figures
 from spikecam_env.errors import InputError
 from spikecam_env.sensor import SpikeSensor
 
 BLOCK = 64
-"""Frames asked for at a time."""
+"""Frames of a call."""
 
 SPACE = "tumble"
 """The scene that is timed in space: six objects of 17 000 triangles, one a disk at 2000 rpm, one before the other."""
@@ -44,7 +47,9 @@ WARM = 4
 def bench_scenes(names: Iterable[str] = (), seconds: float = 2.0) -> dict[str, Rows]:
     """Tables by title, at 250 x 400, on NUMBA_NUM_THREADS threads.
 
-    names: scenes whose flow is checked; default the whole catalogue.  seconds: time spent on each measurement.
+    Args:
+        names: scenes whose flow is checked; default the whole catalogue.
+        seconds: time for each measurement.
     """
     steps = {
         "planar scenes": lambda: bench_planar(seconds),
@@ -57,12 +62,13 @@ def bench_scenes(names: Iterable[str] = (), seconds: float = 2.0) -> dict[str, R
 
 
 def bench_planar(seconds: float = 2.0) -> Rows:
-    """Frames a second, and how far the disk is from 16 x 16 samples a pixel, inside its rim, share of full scale.
+    """Speed of flat scenes, and error of the disk.
 
-    Columns: scene; pixels a key, most that anything moves from one to the next; keys a frame; frames/s; best block
-    of 64, what it is where the machine does nothing else; processor, time of all threads together; rms at keys; rms of
-    frames, the light that the sensor collects over a frame against 8 instants of it, which is what counts; rms midway,
-    the instant half-way between two keys, the worst.
+    Returns:
+        Rows of scene; pixels a key, the largest motion from one to the next; keys a frame; frames/s; best block of 64,
+        the speed of an idle machine; processor, time of all threads together.  Errors are against 16 x 16 samples a
+        pixel, inside the rim, share of full scale.  rms of frames, the light that the sensor collects over a frame
+        against 8 instants of it, is the error of a recording.  rms at keys and midway between two are its limits.
     """
     texture, dark = disk_texture(np.random.default_rng(3)), 0.2
     disks = {"disk, 2000 rpm": (2000.0, 0.6), "disk, 2000 rpm, a key every second frame": (2000.0, 1.2)}
@@ -83,10 +89,11 @@ def bench_planar(seconds: float = 2.0) -> Rows:
 
 
 def bench_space(seconds: float = 2.0, name: str = SPACE, instants: int = 6) -> Rows:
-    """Frames a second, and how far light at instants in the middle of frames is from pictures rendered at those very
-    instants by 16 x 16 rays a pixel, where anything moves, share of full scale (the brightest light).
+    """Speed and error of a scene in space.
 
-    Columns: as `bench_planar`, with the share of the picture that moves.
+    Returns:
+        A row as of `bench_planar`, with the share of the picture that moves.  The error is that of light in the middle
+        of frames against pictures of 16 x 16 rays a pixel, over the moving part, as share of the brightest light.
     """
     scene = make_scene(name, SHAPE)
     if not isinstance(scene, World):
@@ -107,9 +114,10 @@ def bench_space(seconds: float = 2.0, name: str = SPACE, instants: int = 6) -> R
 
 
 def bench_end_to_end(seconds: float = 2.0) -> Rows:
-    """From scene to noisy spikes (model scsim, engine fast), in blocks of 64 frames, and where the time goes.
+    """Speed from scene to noisy spikes (model scsim, engine fast), in blocks of 64 frames.
 
-    Columns: scene, frames/s, x real time (40 000 frames a second), light, % and camera, % of the time, keys a frame.
+    Returns:
+        Rows of scene, frames/s, x real time (40 000 frames a second), light, % and camera, % of the time, keys a frame.
     """
     rows = []
     for name, scene in {"disk": RotatingDisk(SHAPE), SPACE: make_scene(SPACE, SHAPE)}.items():
@@ -158,7 +166,7 @@ def flow_table(names: Iterable[str]) -> Rows:
 
 
 def _speed(name: str, scene: Scene, pixels_a_frame: float | None, seconds: float) -> dict[str, Any]:
-    """Blocks of light one after the other, each of frames that were never asked for before."""
+    """Blocks of light one after the other, each of new frames."""
     times: list[float] = []
     keys = start = 0
     for _ in range(WARM):
@@ -213,3 +221,17 @@ def _disk_errors(disk: RotatingDisk, texture: NDArray[np.float32], dark: float) 
 def _rms(errors: list[NDArray[np.float64]]) -> float:
     """[%]"""
     return 100 * float(np.sqrt(np.mean(np.square(np.concatenate(errors)))))
+
+
+def main(out: Path | None = None, json: bool = False) -> None:
+    """Print the speed of scenes, the error of their light, and the error of their flow.
+
+    Args:
+        out: file for the figures, as JSON.
+        json: print the figures as JSON, and no table.
+    """
+    print_figures(bench_scenes, out, json)
+
+
+if __name__ == "__main__":
+    tyro.cli(main)

@@ -1,17 +1,20 @@
-"""What each effect costs on the fast engine, as a ratio to the base model measured in the same run.
+"""Cost of each effect on the fast engine, as a ratio to the base model measured in the same run.
 
-spikecam bench effects
+python -m benchmarks.effects
 """
 
 from __future__ import annotations
 
 import time
 from collections.abc import Iterable
+from pathlib import Path
 from typing import Any
 
 import numpy as np
+import tyro
 from tqdm import tqdm
 
+from spikecam_env.cli.bench import print_figures
 from spikecam_env.sensor.effects import CATALOGUE
 from spikecam_env.sensor.model import SensorModel
 from spikecam_env.sensor.sensor import SpikeSensor
@@ -25,9 +28,14 @@ def bench_effects(
 ) -> list[dict[str, Any]]:
     """Measure steady light of one level on one array size after another, with NUMBA_NUM_THREADS threads.
 
-    names: effects to measure; default all that act from frame to frame.  level: spikes a frame.  seconds: for each
-    effect and shape; the best repeat of 64 frames counts, and compiling does not.
-    Columns: effect, and for each shape ns/px-step and the ratio to the base model, scsim without the effect.
+    Args:
+        names: effects to measure; default all that act from frame to frame.
+        level: spikes a frame.
+        seconds: time for each effect and shape; the best repeat of 64 frames counts, and compiling does not.
+        shapes: sizes of the array.
+
+    Returns:
+        Rows of effect, and for each shape ns/px-step and the ratio to the base model, scsim without the effect.
     """
     chosen = list(names) or [name for name, effect in CATALOGUE.items() if not effect.is_fixed()]
     base = SensorModel.preset("scsim")
@@ -54,3 +62,17 @@ def _seconds_a_step(model: SensorModel, shape: tuple[int, int], level: float, se
         best = min(best, end - begin)
         if end >= until:
             return best / (FRAMES * light.size)
+
+
+def main(out: Path | None = None, json: bool = False) -> None:
+    """Print the cost of each effect over the base model.
+
+    Args:
+        out: file for the figures, as JSON.
+        json: print the figures as JSON, and no table.
+    """
+    print_figures(bench_effects, out, json)
+
+
+if __name__ == "__main__":
+    tyro.cli(main)

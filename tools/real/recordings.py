@@ -1,4 +1,4 @@
-"""The real recordings that the preset `measured` is fitted to, and what is measured on them.
+"""The real recordings that the preset `measured` is fitted to, and their statistics.
 
 wall.npz: 500 frames of a wall in good light.  Only a rectangle of bare wall is used: nothing moves there; leaves and
 edges, which tremble by more than the noise, are outside.  flat_335lux_maps.npz: spikes of each pixel in light and in
@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from spikecam_env.calibration.flat_maps import read_flat_maps
 from spikecam_env.calibration.response import rates_from_times
-from spikecam_env.calibration.spike_times import SpikeTimes, spike_times
+from spikecam_env.calibration.spike_times import SpikeTimes, ideal_second_difference, spike_times
 from spikecam_env.compiled import njit
 from spikecam_env.errors import InputError
 from spikecam_env.streams import pack_frames
@@ -27,7 +27,7 @@ WALL = (slice(110, 200), slice(15, 355))
 """Rows and columns of bare wall."""
 
 STEPS = tuple(range(1, 41))
-"""k of A_k that acceptance asks for."""
+"""k of A_k that are compared."""
 
 MAPS = "flat_335lux_maps.npz"
 MAPS_FRAME_RATE_HZ = 20_000.0
@@ -57,24 +57,26 @@ def read_response_and_dark(folder: str | Path) -> tuple[Floats, Floats]:
 
 @dataclass(frozen=True)
 class WallStatistics:
-    """What static pixels show.  times: spikes of each pixel at STEPS; rate: (P,) [spikes/frame].
-
-    excess, excess_sd: (40,) A_k less that of an ideal camera at the same rates, and its standard error over pixels.
-    minimum_range: (P,) smallest range over slopes a of N(t) - a t; below 1 for an ideal camera.
-    variance_excess: mean over pixels of interval variance less f(1-f); variance_excess_sd: its standard error.
-    """
+    """Statistics of static pixels."""
 
     times: SpikeTimes
+    """Spike times of each pixel, at STEPS."""
     rate: Floats
+    """(P,) rates [spikes/frame]."""
     excess: Floats
+    """(40,) A_k less that of an ideal camera at the same rates."""
     excess_sd: Floats
+    """(40,) standard errors of `excess`, over pixels."""
     minimum_range: Floats
+    """(P,) smallest range over slopes a of N(t) - a t; below 1 for an ideal camera."""
     variance_excess: float
+    """Mean over pixels of interval variance less f(1-f)."""
     variance_excess_sd: float
+    """Standard error of `variance_excess`."""
 
 
 def wall_statistics(spikes: NDArray[np.uint8]) -> WallStatistics:
-    """All of them, from (T, rows, columns) spikes of steady light."""
+    """Statistics of (T, rows, columns) spikes of steady light."""
     pixels = spikes.shape[1] * spikes.shape[2]
     packed = pack_frames(spikes)
     times = spike_times(packed, pixels, STEPS)
@@ -93,28 +95,6 @@ def wall_statistics(spikes: NDArray[np.uint8]) -> WallStatistics:
         float(floor.mean()),
         float(floor.std() / np.sqrt(floor.size)),
     )
-
-
-def plausible_rates(times: SpikeTimes, white: float, rng: np.random.Generator) -> Floats:
-    """(P,) rates drawn from what each pixel's first and last spike leave open, under jitter s^2 = white.
-
-    Measured rates crowd at simple fractions: a pixel of interval 5.004 shows one of 5 for a hundred spikes.  A camera
-    simulated at exactly such rates has second differences that no real one has; drawn rates lie as the true ones do.
-    """
-    n = np.maximum(times.count - 1, 1)
-    interval = np.maximum(times.last - times.first, 1) / n
-    after = times.frames - 1 - times.last
-    begin = times.first + rng.random(n.size) * np.clip(interval - times.first, 0.0, 1.0)
-    end = times.frames - after - rng.random(n.size) * np.clip(interval - after, 0.0, 1.0)
-    walk = np.sqrt(n * white) * interval * rng.standard_normal(n.size)
-    least = n  # a pixel fires once a frame at most, however wide the jitter
-    return np.asarray(n / np.maximum(end - begin + walk, least))
-
-
-def ideal_second_difference(k: NDArray[np.int64], interval: Floats) -> Floats:
-    """A_k of a noise-free pixel of interval T, phase uniform: 2 min(x, 1 - x), x the fractional part of kT."""
-    x = np.mod(k * interval, 1.0)
-    return 2.0 * np.minimum(x, 1.0 - x)
 
 
 def _variance_above_floor(spikes: NDArray[np.uint8]) -> Floats:

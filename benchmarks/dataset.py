@@ -1,6 +1,6 @@
-"""How fast a dataset is made, and where the time goes.
+"""Speed of making a dataset, and the share of each part.
 
-spikecam bench dataset
+python -m benchmarks.dataset
 """
 
 from __future__ import annotations
@@ -9,8 +9,12 @@ import os
 import tempfile
 import time
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
+import tyro
+
+from spikecam_env.cli.bench import print_figures
 from spikecam_env.datasets.build import Built, build
 from spikecam_env.datasets.plan import Plan, phm_n
 from spikecam_env.datasets.verify import verify
@@ -22,13 +26,17 @@ PARTS = ("scene", "noisy", "clean", "file", "truth", "digest", "start")
 
 
 def bench_dataset(plan: Plan | None = None, jobs: int | None = None) -> list[dict[str, Any]]:
-    """Make a dataset and verify it; default: the PHM-like scenes, 1000 frames each at 250 x 400, one process a core.
+    """Make a dataset and verify it.
 
-    Columns: run, scenes, frames/s (wall clock, start of the processes included), processor time a frame [ms] (which
-    other work on the machine changes little; starting the processes not included), and the share of the workers' time
-    on each part: scene (light), noisy and clean (camera and twin), file (packing and writing), truth, digest (SHA-256),
-    start (making the scene, exposure, compiling or loading what is compiled).
-    Rows: one process (first scenes only), all processes, verify.
+    Args:
+        plan: default: the PHM-like scenes, 1000 frames each at 250 x 400.
+        jobs: processes; default: one a core.
+
+    Returns:
+        Rows of one process (first scenes only), all processes, and verify.  frames/s is by the wall clock, the start of
+        the processes included.  Processor time a frame [ms] is without it, and other work on the machine changes it
+        little.  Then the share of the workers' time on each part: scene (light), noisy and clean (camera and twin),
+        file (packing and writing), truth, digest (SHA-256), start (scene, exposure, compiled code).
     """
     plan = phm_n() if plan is None else plan
     jobs = (os.cpu_count() or 1) if jobs is None else jobs
@@ -57,3 +65,17 @@ def _row(name: str, plan: Plan, wall_s: float, built: Built | None) -> dict[str,
         "processor ms/frame": 1e3 * built.processor_s / frames if built else None,
         **{part: f"{seconds[part] / total:.0%}" if part in seconds else None for part in PARTS},
     }
+
+
+def main(out: Path | None = None, json: bool = False) -> None:
+    """Print frames a second of a dataset into files, and the share of each part.
+
+    Args:
+        out: file for the figures, as JSON.
+        json: print the figures as JSON, and no table.
+    """
+    print_figures(bench_dataset, out, json)
+
+
+if __name__ == "__main__":
+    tyro.cli(main)

@@ -1,15 +1,6 @@
-"""What the audit calls motion: false alarms on static recordings, and the smallest region and contrast it finds.
-
-    python -m benchmarks.motion_limits [--trials 20] [--frames 500]
-
-Static: a picture through the package's models, and with each effect that changes static recordings in time.  Moving: a
-square of a contrast against its surroundings that is there for a quarter of the recording, a ball that crosses in a
-tenth of it, and a texture that drifts by 0.01 pixels a frame.
-"""
+"""Scenes at the limits of the test of motion: static, a square, a ball, a texture that drifts."""
 
 from __future__ import annotations
-
-import argparse
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,7 +8,7 @@ from numpy.typing import NDArray
 from spikecam_env.gap.baseline.motion import DetectedMotion, find_motion
 from spikecam_env.gap.observe.conditions import Condition
 from spikecam_env.gap.observe.observation import observe
-from spikecam_env.sensor import CATALOGUE, Keyframes, SensorModel, SpikeSensor
+from spikecam_env.sensor import Keyframes, SensorModel, SpikeSensor
 from spikecam_env.streams import pack_frames
 
 SHAPE = (64, 64)
@@ -47,7 +38,7 @@ def picture(shape: tuple[int, int] = SHAPE) -> NDArray[np.float32]:
 def looked_at(
     model: SensorModel, light: NDArray[np.float32] | Keyframes, frames: int, seed: int
 ) -> DetectedMotion | None:
-    """What moves in a simulated recording of an unknown scene."""
+    """The motion in a simulated recording of an unknown scene."""
     sensor = SpikeSensor(model, SHAPE, seed)
     seen = observe(pack_frames(sensor.step(light, frames)), SHAPE)
     return find_motion(Condition("scene", "unknown", np.nan, None, frames, "fit"), seen)
@@ -77,32 +68,3 @@ def drift(frames: int, speed: float = 0.01, contrast: float = 0.5) -> Keyframes:
     row, column = np.mgrid[: SHAPE[0], : SHAPE[1]]
     wave = np.sin(2 * np.pi * (column - speed * times[:, None, None]) / 12) * np.sin(2 * np.pi * row / 12)
     return Keyframes(times.astype(np.float64), (0.15 * (1 + contrast * wave)).astype(np.float32))
-
-
-def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--trials", type=int, default=20)
-    parser.add_argument("--frames", type=int, default=500)
-    asked = parser.parse_args()
-    seeds, frames, scsim = range(asked.trials), asked.frames, SensorModel.preset("scsim")
-    print(f"static, {frames} frames of {SHAPE[0]} x {SHAPE[1]} pixels: called moving, of {asked.trials}")
-    models = {name: SensorModel.preset(name) for name in ("ideal", "scsim", "physical", "measured")}
-    models |= {n: scsim.with_effect(CATALOGUE[n](**parameters)) for n, parameters in CHANGES_IN_TIME.items()}
-    for name, model in models.items():
-        print(f"  {name:26}", sum(looked_at(model, picture(), frames, s) is not None for s in seeds), flush=True)
-    moving = {"ball": ball(frames), "drift of 0.01 pixels a frame": drift(frames)}
-    print("moving: found")
-    for name, light in moving.items():
-        print(f"  {name:30}", sum(looked_at(scsim, light, frames, s) is not None for s in seeds), flush=True)
-    print("a square for a quarter of the time: found, by contrast (across) and side")
-    contrasts = (0.1, 0.2, 0.4, 0.8)
-    print("  side", *(f"{c:5.0%}" for c in contrasts))
-    for side in (2, 4, 8, 16):
-        found = [
-            sum(looked_at(scsim, square(side, c, frames), frames, s) is not None for s in seeds) for c in contrasts
-        ]
-        print(f"  {side:4}", *(f"{n:5}" for n in found), flush=True)
-
-
-if __name__ == "__main__":
-    main()

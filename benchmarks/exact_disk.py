@@ -1,4 +1,4 @@
-"""What a picture of a disk should be: many samples a pixel, straight from the texture.  Slow."""
+"""The exact picture of a disk: many samples a pixel, straight from the texture.  Slow."""
 
 from __future__ import annotations
 
@@ -19,9 +19,15 @@ def supersampled(
     gaze: Gaze | None = None,
     samples: int = 16,
 ) -> NDArray[np.float32]:
-    """The radiance (H, W) at an instant by samples x samples a pixel.
+    """The radiance (H, W) at an instant.
 
-    texture, background: those that the disk was made with, a light of (0, 1).
+    Args:
+        disk: a disk with a light of (0, 1).
+        texture: its texture.
+        background: its background.
+        frame: the instant.
+        gaze: the camera's gaze.
+        samples: samples a pixel along each axis.
     """
     picture = np.empty(disk.shape, np.float32)
     x, y = disk.centre_at(frame, gaze)

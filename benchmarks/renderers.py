@@ -1,6 +1,6 @@
 """How fast and how exact each back-end is on this machine, on one picture of six textured objects, 17 000 triangles.
 
-spikecam bench renderers
+python -m benchmarks.renderers
 """
 
 from __future__ import annotations
@@ -9,10 +9,12 @@ import time
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass
 from multiprocessing import get_context
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import trimesh
+import tyro
 from numpy.typing import NDArray
 from trimesh.transformations import rotation_matrix
 
@@ -21,6 +23,7 @@ from scenes.renderers.embree import Embree
 from scenes.renderers.protocol import Lighting, PictureWindow, Pinhole, Renderer, Sprite, Surface
 from scenes.textures import TEXTURES
 from spikecam_env.bench.machine import SHAPE
+from spikecam_env.cli.bench import print_figures
 
 EXACT_RAYS = 16
 """A pixel and axis, of the picture that back-ends, and light in space, are compared with."""
@@ -30,20 +33,18 @@ Objects = list[tuple[Surface, NDArray[np.float64]]]
 
 @dataclass(frozen=True)
 class RendererComparison:
-    """One back-end on this machine.
-
-    backend    as `choose_renderer` takes it
-    name       as the back-end calls itself; what is wrong where it does not work
-    key_ms     all objects of the picture once, best of the repeats [ms]; nan where it does not work
-    error      rms of radiance against `EXACT_RAYS`^2 rays a pixel where there is an object, share of full scale
-    to_embree  rms of radiance against embree at the same supersampling, likewise
-    """
+    """One back-end on this machine."""
 
     backend: str
+    """Name, as `choose_renderer` takes it."""
     name: str
+    """The back-end's own name, or the reason why it does not work."""
     key_ms: float
+    """Time of all objects of the picture once, best of the repeats [ms]; NaN where it does not work."""
     error: float
+    """rms of radiance against `EXACT_RAYS`^2 rays a pixel where there is an object, share of full scale."""
     to_embree: float
+    """rms of radiance against embree at the same supersampling, likewise."""
 
 
 def compare_backends(
@@ -134,3 +135,17 @@ def _rms(key: list[NDArray[np.float32]], other: list[NDArray[np.float32]], cover
     """Over the pixels of all objects where there is light."""
     squares = [np.square(a - b, dtype=np.float64)[c > 0] for a, b, c in zip(key, other, covered, strict=True)]
     return float(np.sqrt(np.mean(np.concatenate(squares))))
+
+
+def main(out: Path | None = None, json: bool = False) -> None:
+    """Print the speed and the error of each back-end of this machine.
+
+    Args:
+        out: file for the figures, as JSON.
+        json: print the figures as JSON, and no table.
+    """
+    print_figures(bench_renderers, out, json)
+
+
+if __name__ == "__main__":
+    tyro.cli(main)

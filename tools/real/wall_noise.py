@@ -1,9 +1,8 @@
-"""White and slow temporal noise of real static pixels, fitted by simulating what was measured on them.
+"""White and slow temporal noise of real static pixels, fitted by simulating their statistics.
 
 The closed law of A_k (`jitter`) wants mean intervals known far better than 500 frames give: at k = 40, a third of the
-recording, a pixel's interval and its second differences are made of the same spikes.  So simulated pixels go through
-the same statistics, at rates drawn from what the recording leaves open, and s^2 and the octaves' variance are moved
-until both agree:
+recording, a pixel's interval and its second differences are made of the same spikes.  So pixels are simulated at drawn
+rates that agree with the recording, and s^2 and the octaves' variance are fitted until the statistics agree:
 
     threshold of a spike = 1 + s z + sigma sum over octaves j of AR(1) with correlation time 2^(j+1) frames
 
@@ -18,14 +17,9 @@ import numpy as np
 from numpy.typing import NDArray
 from tqdm import tqdm
 
-from spikecam_env.calibration.real import (
-    STEPS,
-    WallStatistics,
-    ideal_second_difference,
-    plausible_rates,
-    wall_statistics,
-)
+from spikecam_env.calibration.spike_times import ideal_second_difference, plausible_rates
 from spikecam_env.types import Floats
+from tools.real.recordings import STEPS, WallStatistics, wall_statistics
 
 OCTAVES = 12
 
@@ -37,17 +31,18 @@ _MOVES = np.array([1e-5, 1e-7])
 
 @dataclass(frozen=True)
 class WallNoise:
-    """white: s^2.  octave: sigma^2, variance of one octave of slow noise, thresholds^2.  sd: standard errors.
-
-    chi2: of the 40 values of excess A_k about the fit, 38 of freedom; white_alone_chi2: without slow noise, 39.
-    """
+    """Fitted noise, with standard errors."""
 
     white: float
+    """s^2."""
     white_sd: float
     octave: float
+    """sigma^2, variance of one octave of slow noise [thresholds^2]."""
     octave_sd: float
     chi2: float
+    """chi2 of the 40 values of excess A_k about the fit, 38 of freedom."""
     white_alone_chi2: float
+    """chi2 without slow noise, 39 of freedom."""
 
 
 def fit_wall_noise(wall: WallStatistics, *, progress: bool = False) -> WallNoise:

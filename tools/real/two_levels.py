@@ -1,4 +1,4 @@
-"""What two lit recordings and a dark one say of how pixels differ: at 335 and 153 lux, spikes above those in the dark.
+"""Differences of pixels by two lit recordings and a dark one: at 335 and 153 lux, spikes above those in the dark.
 
     (lit - dark) / its smooth part - 1 = g + o / smooth part        g: gain, o: an offset, the same at both levels
 
@@ -26,25 +26,30 @@ _HOT = 0.015
 
 @dataclass(frozen=True)
 class TwoLevels:
-    """Relative spreads beside the shading at 335 and 153 lux; of gain; of offset [spikes in FRAMES].  Correlations.
-
-    covariance_off: covariance of both levels beyond what gain and offset of no correlation give, in its share.
-    gain_dark, offset_dark, lit_dark: correlation of gain, offset, response at 335 lux with ln(dark), shading removed.
-    ratio: median response at 335 over that at 153 lux; ratio_slope: its 1 .. 99 % range over the array, smoothed.
-    common: spread of a common factor of response and dark that lit_dark would take, e.g. of the threshold.
-    """
+    """Relative spreads beside the shading, and correlations over pixels."""
 
     lit: float
+    """Spread at 335 lux."""
     dim: float
+    """Spread at 153 lux."""
     gain: float
+    """Spread of gain."""
     offset: float
+    """Spread of the offset [spikes in FRAMES]."""
     covariance_off: float
+    """Covariance of both levels, over that of uncorrelated gain and offset, less one."""
     gain_dark: float
+    """Correlation of gain with ln(dark), shading removed."""
     offset_dark: float
+    """Correlation of the offset with ln(dark), shading removed."""
     lit_dark: float
+    """Correlation of the response at 335 lux with ln(dark), shading removed."""
     ratio: float
+    """Median response at 335 lux over that at 153."""
     ratio_slope: float
+    """1 .. 99 % range of the smoothed ratio over the array, relative."""
     common: float
+    """Spread of a common factor of response and dark (e.g. of the threshold) that would give `lit_dark`."""
 
     def __str__(self) -> str:
         return (
