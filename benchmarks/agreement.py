@@ -23,7 +23,7 @@ _LEVELS = 12
 
 
 @dataclass(frozen=True)
-class Observation:
+class ObservedSpikes:
     """Spikes of P pixels."""
 
     spike: NDArray[np.int64]
@@ -39,7 +39,7 @@ class Observation:
         return np.where(self.spike[:, 1:] < 0, -1, np.diff(self.spike, axis=1))
 
 
-def observe(sensor: SpikeSensor, light: Keyframes | ArrayLike, frames: int, spikes: int = 5) -> Observation:
+def observe(sensor: SpikeSensor, light: Keyframes | ArrayLike, frames: int, spikes: int = 5) -> ObservedSpikes:
     """Run a sensor for `frames` frames, and keep the first spikes, the counts and a word of each pixel."""
     pixels = sensor.shape[0] * sensor.shape[1]
     spike = np.full((pixels, spikes), -1, dtype=np.int64)
@@ -54,10 +54,10 @@ def observe(sensor: SpikeSensor, light: Keyframes | ArrayLike, frames: int, spik
             count[fires] += 1
             if 8 <= first + i < 24:
                 word = 2 * word + frame
-    return Observation(spike, count, word)
+    return ObservedSpikes(spike, count, word)
 
 
-def compare(a: Observation, b: Observation) -> dict[str, float]:
+def compare(a: ObservedSpikes, b: ObservedSpikes) -> dict[str, float]:
     """p-values that a and b are of one law, by name; a test without two cells to compare is left out."""
     ia, ib = a.interval, b.interval
     tests = {"first spike": same_law(a.spike[:, 0], b.spike[:, 0])}
@@ -70,7 +70,7 @@ def compare(a: Observation, b: Observation) -> dict[str, float]:
     return {name: p for name, p in tests.items() if p is not None}
 
 
-def neighbours(a: Observation, distances: tuple[int, ...] = (1, 16, 256)) -> dict[str, float]:
+def neighbours(a: ObservedSpikes, distances: tuple[int, ...] = (1, 16, 256)) -> dict[str, float]:
     """p-values that intervals of pixels at these distances are independent; for light that is alike everywhere."""
     tests = {}
     for distance in distances:

@@ -52,7 +52,7 @@ CAMERA = 1000
 
 
 @dataclass(frozen=True)
-class Trial:
+class BoundTrial:
     """One campaign with an effect hidden."""
 
     name: str
@@ -89,7 +89,7 @@ def stated() -> list[Bound]:
     return bounds(case, MODEL, null, values, names, shipped_templates())[0]
 
 
-def trial(bound: Bound, number: int) -> Trial:
+def trial(bound: Bound, number: int) -> BoundTrial:
     """One campaign of a camera that has the effect at its bound; of either sign, in every second one the other."""
     sign = -1 if number % 2 and candidate(bound.name).may_be_negative else 1
     hidden = bounded(bound.name, {**bound.at, bound.parameter: sign * bound.below})
@@ -97,7 +97,7 @@ def trial(bound: Bound, number: int) -> Trial:
     null, values = judged(case)
     alarm = is_discrepant(null, values) or is_discrepant(null, values_to_fit(case, null, values))
     found, _ = bounds(case, MODEL, null, values, [bound.name], _of_shape(bound))
-    return Trial(bound.name, number, found[0].below if found else None, alarm)
+    return BoundTrial(bound.name, number, found[0].below if found else None, alarm)
 
 
 def _of_shape(bound: Bound) -> Templates:
@@ -109,7 +109,7 @@ def _of_shape(bound: Bound) -> Templates:
     return replace(shipped, entries=tuple(alike))
 
 
-def rows(found: Sequence[Bound], done: Sequence[Trial]) -> Iterator[dict[str, Any]]:
+def rows(found: Sequence[Bound], done: Sequence[BoundTrial]) -> Iterator[dict[str, Any]]:
     """A row an effect: its bound, how many of its trials it covers, and how many ring the alarm."""
     for b in found:
         own = [t for t in done if t.name == b.name]
@@ -128,7 +128,7 @@ def rows(found: Sequence[Bound], done: Sequence[Trial]) -> Iterator[dict[str, An
         }
 
 
-def covers(bound: Bound, told: Trial) -> bool:
+def covers(bound: Bound, told: BoundTrial) -> bool:
     """Whether a campaign does not exclude the effect that is hidden in it."""
     return told.alarm or told.below is None or told.below >= bound.below * (1 - 1e-9)
 
@@ -153,7 +153,7 @@ def main(out: Path, trials: int = 20, jobs: int = 1, only: tuple[str, ...] = ())
     """
     kept = json.loads(out.read_text(encoding="utf-8")) if out.exists() else {"bounds": [], "trials": []}
     known = [Bound(**b) for b in kept["bounds"]] or stated()
-    done = [Trial(**t) for t in kept["trials"]]
+    done = [BoundTrial(**t) for t in kept["trials"]]
     have = {(t.name, t.number) for t in done}
     left = [(b, n) for n in range(trials) for b in known if (b.name, n) not in have and (not only or b.name in only)]
     with ProcessPoolExecutor(jobs, mp_context=get_context("spawn")) as pool:

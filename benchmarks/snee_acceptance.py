@@ -22,7 +22,7 @@ from spikecam_env.sensor.effects.hot_pixels import HotPixels
 
 
 @dataclass(frozen=True)
-class Case:
+class AcceptanceCase:
     """A unit and its campaign.  unit_seed: the calibration is told neither it nor the model."""
 
     name: str
@@ -33,21 +33,21 @@ class Case:
     reset_noise_mV: float | None = None
 
 
-def cases() -> list[Case]:
+def cases() -> list[AcceptanceCase]:
     """The issue's: a plain unit, one with a second V_d, one with dead and hot pixels and two saturated levels."""
     physical = SensorModel.preset("physical")
     levels = tuple(np.linspace(0.0, 0.75, 25).round(4).tolist())
     odd = physical.with_effect(HotPixels(fraction=0.005, mean_pA=10.0))
     odd = odd.with_effect(DeadPixels(fraction=0.005))
     return [
-        Case("physical, one V_d", physical, levels),
-        Case("physical, two V_d", physical, levels, second_v_d=0.7),
-        Case("scsim, reset noise given", SensorModel.preset("scsim"), levels, reset_noise_mV=6.36),
-        Case("dead, hot, two saturated", odd, (*levels[:23], 1.3, 1.6)),
+        AcceptanceCase("physical, one V_d", physical, levels),
+        AcceptanceCase("physical, two V_d", physical, levels, second_v_d=0.7),
+        AcceptanceCase("scsim, reset noise given", SensorModel.preset("scsim"), levels, reset_noise_mV=6.36),
+        AcceptanceCase("dead, hot, two saturated", odd, (*levels[:23], 1.3, 1.6)),
     ]
 
 
-def judged(case: Case, calibration: Calibration, shape: tuple[int, int], frames: int) -> dict[str, float]:
+def judged(case: AcceptanceCase, calibration: Calibration, shape: tuple[int, int], frames: int) -> dict[str, float]:
     """Errors against the truth that the simulation knows."""
     unit = SpikeSensor(case.model, shape, case.unit_seed).unit
     regular = calibration.flags.reshape(-1) == 0

@@ -41,8 +41,6 @@ from spikecam_env.sensor import Keyframes, SensorModel, SpikeSensor
 from spikecam_env.sensor.effects import CATALOGUE
 from spikecam_env.types import Floats, Spikes
 
-FRAME_HZ = 40_000.0
-
 JUMP = 1e-6
 """Time that a jump of light takes [frames]."""
 
