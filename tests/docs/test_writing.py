@@ -68,7 +68,7 @@ def test_the_size_at_which_code_is_tested_replaces_words_that_are_in_it(page: Pa
 
 
 def test_wrapped_code_says_the_same() -> None:
-    """Words of a command line, and the syntax tree of Python, stay as they were; what fits stays too."""
+    """Words of a command line, and the syntax tree of Python, stay as they were; code that fits stays too."""
     line = "spikecam film clip.mp4 --film-rate 1000 --transfer linear --mean-interval 6 --out clip.h5  # 'a' clip"
     assert [shlex.split(one) for one in command_lines(code_width.commands(f"{line}\n"))] == [
         shlex.split(line, comments=True)

@@ -68,7 +68,7 @@ class PixelMaps:
 
 
 class ReportedRecording(NamedTuple):
-    """One recording: its conditions, and what it gave: measured, of twins before and after, of another twin before."""
+    """One recording: conditions, spikes as measured, of twins before and after, and of another twin before."""
 
     shown: Condition
     measured: ObservedRecording
