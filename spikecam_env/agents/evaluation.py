@@ -7,6 +7,7 @@ print(evaluate(model, "Catch-v1", stack=3))
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
 import gymnasium
@@ -28,7 +29,7 @@ MOST_STACK = 1000
 
 
 def evaluate(
-    policy: any,
+    policy: Any,
     task: str,
     *,
     episodes: int | None = None,
@@ -36,7 +37,7 @@ def evaluate(
     split: str = "test",
     stack: int = 1,
     obs: str | Observation | None = None,
-    wrap: callable[[Env], Env] | None = None,
+    wrap: Callable[[Env], Env] | None = None,
     progress: bool | None = None,
     **options: Any,
 ) -> Evaluation:
