@@ -170,7 +170,11 @@ _LITTLE = 1 << 24
 
 
 def checked_memory(size: int, what: str) -> None:
-    """Raises InputError where so many bytes are more than the memory of this machine or container."""
+    """Check that the memory of this machine or container is enough for `what`.
+
+    Raises:
+        InputError: it has less than `size` bytes.
+    """
     if size <= _LITTLE:
         return
     most = memory_bytes()
@@ -179,7 +183,11 @@ def checked_memory(size: int, what: str) -> None:
 
 
 def checked_disk(size: int, path: str | Path, what: str) -> None:
-    """Raises InputError where so many bytes are more than is free where `path` is or will be."""
+    """Check that the disk of a path, whose folders may not exist yet, has room for `what`.
+
+    Raises:
+        InputError: it has less than `size` bytes free.
+    """
     place = Path(path).absolute()
     while not os.path.exists(place) and place != place.parent:  # False too for a name that is too long
         place = place.parent

@@ -37,7 +37,11 @@ def file_name(text: str, kind: str) -> str:
 
 
 def distinct(names: Iterable[str], kind: str) -> None:
-    """Raises InputError where two names are one file: the same text, or the same but for upper and lower case."""
+    """Check that names are different files, whatever their upper and lower case.
+
+    Raises:
+        InputError: two are the same.
+    """
     seen: dict[str, list[str]] = {}
     for name in names:
         seen.setdefault(unicodedata.normalize("NFC", name).casefold(), []).append(name)

@@ -131,8 +131,11 @@ def _row(name: str, shown: list[Moment]) -> Image.Image:
 
 
 def _marked(moment: Moment) -> Image.Image:
-    """The observation for a screen (gamma 2.2), enlarged, with a green square about the target, and in yellow what
-    the region that counts as the middle: a circle, or, where the camera only pans, two bars."""
+    """The observation for a screen (gamma 2.2), enlarged.
+
+    A green square is about the target.  Yellow marks the middle of the view: a circle, or two bars where the camera
+    only pans.
+    """
     light = (255 * (moment.seen / 255) ** (1 / 2.2)).astype(np.uint8)
     rows, columns = light.shape
     picture = Image.fromarray(light).resize((ZOOM * columns, ZOOM * rows), Image.Resampling.NEAREST).convert("RGB")

@@ -26,7 +26,11 @@ Size = Annotated[tuple[int, int], _Shape()]
 
 
 def check_options(command: Any) -> None:
-    """Raises InputError for the first option of a command that is out of its range."""
+    """Check the options of a command.
+
+    Raises:
+        InputError: the first option that is out of its range.
+    """
     hints = get_type_hints(type(command), include_extras=True)
     for field in fields(command):
         value = getattr(command, field.name)

@@ -105,7 +105,11 @@ class DenoisedRecording:
 
 
 def checked_window(window: int | None, frames: int) -> int:
-    """Frames of a mean: WINDOW, or as many as a shorter recording has; odd.  Raises InputError for an unusable one."""
+    """Frames of a mean: WINDOW, or as many as a shorter recording has; odd.
+
+    Raises:
+        InputError: `window` is even, or longer than the recording.
+    """
     if window is None:
         return min(WINDOW, frames - 1 + frames % 2)
     if window % 2 == 0:

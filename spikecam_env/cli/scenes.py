@@ -61,7 +61,7 @@ class Scenes:
                 print(f"{name:10} {about(name)}")
 
     def _check_places(self) -> None:
-        """Raises InputError for files that cannot be written, before either is begun."""
+        """Check that both files can be written, before either is made."""
         from spikecam_env.whole import check_file
 
         for option, path, suffixes in (("film", self.film, (".mp4", ".gif")), ("out", self.out, (".png",))):

@@ -82,7 +82,7 @@ class Train:
         print(f"wrote {_train(self.mode, self._options())}")
 
     def _options(self) -> dict[str, Any]:
-        """Those that the mode has, where they were given.  Raises InputError for others."""
+        """The given options that the mode has; others are refused."""
         others = [name for name, modes in ONLY_OF.items() if self.mode not in modes]
         for field in fields(self):
             if field.name in others and getattr(self, field.name) != field.default:

@@ -325,7 +325,11 @@ def is_array(item: Any) -> TypeGuard[h5py.Dataset]:
 
 
 def check_stored(dataset: h5py.Dataset, where: str) -> None:
-    """Raises InputError where an array declares more than is stored: the rest would be read as zeros."""
+    """Check that an array is stored whole; the rest would be read as zeros.
+
+    Raises:
+        InputError: it declares more than is stored.
+    """
     declared_bytes = math.prod(dataset.shape) * dataset.dtype.itemsize
     most = 1 if dataset.compression is None else MOST_COMPRESSED
     if declared_bytes > most * dataset.id.get_storage_size():

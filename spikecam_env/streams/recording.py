@@ -77,7 +77,11 @@ def read_recording(path: str | Path, **options: Any) -> Recording:
 
 
 def check_options(options: Iterable[str], allowed: tuple[str, ...], kind: str) -> None:
-    """Raises InputError for the first option that a kind of stream does not have."""
+    """Check the options of reading.
+
+    Raises:
+        InputError: the first option that a kind of stream does not have.
+    """
     for name in options:
         if name not in allowed:
             rest = f"; they take {', '.join(allowed)}" if allowed else ""
@@ -87,7 +91,8 @@ def check_options(options: Iterable[str], allowed: tuple[str, ...], kind: str) -
 def reading_options(path: str | Path) -> tuple[str, ...]:
     """Names of the options that apply to a recording, by its name, and for HDF5 by its content.
 
-    Raises InputError for another ending, or no HDF5 file.
+    Raises:
+        InputError: another ending, or no HDF5 file.
     """
     return _reader(path)[1]
 

@@ -140,7 +140,11 @@ class Flowing:
         return self.taken.frame_rate_hz or FRAME_RATE_HZ
 
     def read(self, rows: Packed) -> int:
-        """Raises InputError where the connection breaks, and where the stream ends before its first frame."""
+        """Fill rows with the next frames; returns their number, 0 at the end.
+
+        Raises:
+            InputError: the connection breaks, or ends before its first frame.
+        """
         try:
             frames, rest = _whole_frames(self.receive, rows, self.taken)
         except OSError as error:

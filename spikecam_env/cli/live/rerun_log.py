@@ -25,7 +25,7 @@ def rerun() -> ModuleType:
 
 
 def recorded(title: str, frame_rate_hz: float, entries: Iterable[TimelineEntry]) -> bytes:
-    """A whole .rrd file: rerun ends every part that it gives away with an index.  Raises InputError without rerun."""
+    """A whole .rrd file: rerun ends every part that it gives away with an index."""
     recording = _recording(title)
     stream = recording.binary_stream()
     _send(recording, frame_rate_hz, entries)
@@ -34,7 +34,7 @@ def recorded(title: str, frame_rate_hz: float, entries: Iterable[TimelineEntry])
 
 
 def watched(title: str, frame_rate_hz: float, entries: Iterable[TimelineEntry]) -> None:
-    """Open the viewer, and fill it.  Raises InputError without rerun, and where its viewer cannot be started."""
+    """Open the viewer, and fill it."""
     recording = _recording(title)
     try:
         recording.spawn()
