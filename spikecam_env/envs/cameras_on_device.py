@@ -54,13 +54,17 @@ class DeviceCameras:
         self._check_models()
         envs = [self._envs[n] for n in numbers]
         batch = self._batch_of(numbers)
-        light = lights_of(envs, partial(planes_on, device=self.device), by_place(each, numbers))
+        light = self._light(envs, by_place(each, numbers))
         spikes: Any = batch.step(light, envs[0].frames_per_step)
         if batch is not self._batch:
             self._batch.exchange(numbers, batch)
         for env, own, block in zip(envs, light, spikes, strict=True):
             env.record(own, block)
         return Blocks(spikes, light, envs[0].model.frame_rate_hz)
+
+    def _light(self, envs: Sequence[SpikeCameraEnv], each: ForEach) -> list[Any]:
+        """The light of the next block of each, planar scenes painted on the device."""
+        return lights_of(envs, partial(planes_on, device=self.device), each)
 
     def returned(self, values: Any) -> Any:
         """Arrays, or a table of them, on the device."""
