@@ -20,6 +20,8 @@ from spikecam_env.datasets import read_window
 from spikecam_env.datasets.manifest import Manifest
 from spikecam_env.errors import InputError
 
+__all__ = ["SpikeWindows"]
+
 
 class Item(TypedDict):
     """A window of one scene."""

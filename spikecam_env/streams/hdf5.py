@@ -117,9 +117,14 @@ class SpikeWriter:
         self._whole.__exit__(kind, error, trace)
 
     def append(self, spikes: ArrayLike, clean: ArrayLike | None = None) -> None:
-        """Add frames: (T, H, W) spikes, and those of the noise-free twin, in every call or in none.
+        """Add frames; fastest in multiples of CHUNK_FRAMES.
 
-        Fastest in multiples of CHUNK_FRAMES frames.
+        Args:
+            spikes: (T, H, W), 0 or 1.
+            clean: those of the noise-free twin, in every call or in none.
+
+        Raises:
+            InputError: frames of another shape or other values, or only one stream of two.
         """
         file = self._open_file()
         streams = {"spikes": self._checked(spikes)}

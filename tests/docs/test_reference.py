@@ -47,7 +47,8 @@ def explained(module: str, name: str) -> list[tuple[Any, str]]:
     """A public name and, of a class, its public methods, each with its docstring."""
     value = getattr(import_module(module), name)
     inside = vars(value).items() if kind_of(value) == "class" else ()
-    methods = [getattr(value, key) for key, member in inside if not key.startswith("_") and inspect.isroutine(member)]
+    members = (getattr(value, key) for key, _ in inside if not key.startswith("_"))
+    methods = [member for member in members if inspect.isfunction(member) or inspect.ismethod(member)]
     return [(value, docstring_of(module, name)), *((method, inspect.getdoc(method) or "") for method in methods)]
 
 
