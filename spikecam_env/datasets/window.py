@@ -25,7 +25,15 @@ FIRST_REACH = 32
 
 @dataclass(frozen=True)
 class SpikeWindow:
-    """A window of a recording, and its clean intervals."""
+    """A window of a recording, and its clean intervals.
+
+    Example:
+        >>> plan = Plan("mine", (PlannedScene("train/disk.h5", "disk", 0, 0),), shape=(8, 16), frames=100)
+        >>> built = build(plan, "small")
+        >>> window = read_window("small/train/disk.h5", 50, reach=10)
+        >>> window.spikes.shape, window.clean_isi.dtype
+        ((21, 8, 16), dtype('float32'))
+    """
 
     spikes: Spikes
     """(2 reach + 1, h, w), noisy."""

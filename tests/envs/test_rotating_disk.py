@@ -158,7 +158,7 @@ def test_model_file_and_scene_options_reach_the_camera(tmp_path: Any) -> None:
         ({"max_gaze_rate_px_s": -1.0}, "max_gaze_rate_px_s is -1"),
         ({"shape": (0, 4)}, "shape = "),
         ({"light": (0.4, 0.1)}, "light"),
-        ({"drift_px_s": -2.0}, "drift_px_s is -2"),
+        ({"drift_px_s": -2.0}, "drift_px_s = -2"),
         ({"engine": "warp"}, "unknown engine"),
     ],
 )

@@ -98,7 +98,7 @@ def test_bodies_in_space_are_seen_where_they_are_said_to_be() -> None:
     [
         ({"scene": "dise"}, "unknown scene 'dise'"),
         ({"scene": "disk", "target": "fly"}, "unknown target .*'fly'"),
-        ({"start_offset_px": -1.0}, "start_offset_px is -1"),
+        ({"start_offset_px": -1.0}, "start_offset_px = -1"),
         ({"scene": "disk", "mean_interval": 0.5}, "mean_interval = 0.5"),
     ],
 )
