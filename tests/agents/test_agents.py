@@ -110,6 +110,7 @@ def test_a_run_that_was_stopped_and_resumed_is_the_run_that_was_not(how: PPO, tm
         assert torch.equal(weights, two.policy.state_dict()[name]), name
 
 
+@pytest.mark.slow
 def test_who_imitates_plays_without_noise_and_comes_to_act_like_the_oracle(tmp_path: Path, monkeypatch) -> None:
     misses: list[float] = []
     learn = ppo._learn
@@ -210,6 +211,7 @@ def _measured_again(*_: object, **__: object) -> None:
     raise AssertionError("it was measured again")
 
 
+@pytest.mark.slow
 def test_a_study_goes_on_from_its_record(tmp_path: Path, monkeypatch, capsys) -> None:
     line = ["evaluate", "agents", "--out", str(tmp_path), "--tasks", "Catch-v1", "--observations", "tracker", "frame30"]
     line += ["--seeds", "2", "--steps", "64", "--episodes", "2"]
@@ -227,6 +229,7 @@ def test_a_study_goes_on_from_its_record(tmp_path: Path, monkeypatch, capsys) ->
     assert [row[1] for row in rows] == ["tracker", "frame30"] and float(rows[0][3]) == 1.0
 
 
+@pytest.mark.slow
 def test_a_learning_curve_has_a_point_for_every_agent_on_the_way(tmp_path: Path) -> None:
     wanted = studies.cases(["Track-v1"], ["tfp", "tracker"], [], [0], 2 * 1024, 2, shape=(16, 16))
     learned, tracked = studies.study(wanted, tmp_path)

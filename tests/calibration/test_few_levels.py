@@ -66,6 +66,7 @@ def calibrated(folder: Path, out: Path, capfd) -> tuple[int, list[str]]:
     return code, [line for line in capfd.readouterr().err.splitlines() if line.strip() and "%|" not in line]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", CALIBRATED)
 def test_a_campaign_that_says_little_is_calibrated_without_warnings(name: str, tmp_path: Path, capfd) -> None:
     folder = campaign(tmp_path / "flats", **CALIBRATED[name])
@@ -96,6 +97,7 @@ def test_two_v_d_that_are_one_but_for_rounding_are_one(tmp_path: Path) -> None:
     assert len(calibration.settings) == 1 and len(calibration.main.levels) == 6
 
 
+@pytest.mark.slow
 def test_two_v_d_too_near_each_other_are_said_and_taken_as_one(tmp_path: Path, capfd) -> None:
     folder = campaign(tmp_path / "flats", levels=(0.0, 0.2, 0.4), second_v_d=1.1001)
     calibration = calibrate(folder)

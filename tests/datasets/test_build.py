@@ -30,6 +30,7 @@ def test_the_same_call_writes_the_same_bytes_later(tmp_path: Path) -> None:
     assert verify(tmp_path / "a") == []
 
 
+@pytest.mark.slow
 def test_killed_worker_is_replaced_and_the_bytes_are_the_same(tmp_path: Path, whole: dict[str, bytes]) -> None:
     killed = kill_first_writer(tmp_path)
     built = build(small_plan(LONG), tmp_path, jobs=2)
@@ -60,6 +61,7 @@ def kill_first_writer(folder: Path):
     return killed
 
 
+@pytest.mark.slow
 def test_killed_twice_and_resumed_gives_the_same_bytes(tmp_path: Path, whole: dict[str, bytes]) -> None:
     plan = small_plan(LONG)
     rng = np.random.default_rng(0)

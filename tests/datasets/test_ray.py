@@ -12,6 +12,7 @@ from spikecam_env.datasets import build
 from spikecam_env.errors import InputError
 
 
+@pytest.mark.slow
 def test_two_workers_one_killed_write_the_bytes_of_one_process(tmp_path: Path, whole: dict[str, bytes]) -> None:
     killed = kill_first_writer(tmp_path)
     built = build(small_plan(LONG), tmp_path, jobs=2, ray="local")

@@ -66,6 +66,7 @@ def test_items_follow_from_seed_epoch_and_index(folder: Path) -> None:
     assert corners(data) != corners(same)
 
 
+@pytest.mark.slow
 def test_loader_processes_give_the_same_items(folder: Path) -> None:
     data = SpikeWindows(folder, "test", crop=(16, 16), stride=16)
     here = [data[i] for i in range(len(data))]
@@ -92,6 +93,7 @@ def test_datasets_that_will_not_do_are_refused(folder: Path, tmp_path: Path) -> 
         SpikeWindows(tmp_path)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("context", ["fork", "spawn"])
 def test_persistent_workers_draw_other_crops_in_every_epoch(folder: Path, context: str) -> None:
     """Those that a loader without workers draws."""
@@ -107,6 +109,7 @@ def test_persistent_workers_draw_other_crops_in_every_epoch(folder: Path, contex
     assert epochs[0] == epochs[3] and epochs[0] != epochs[1] != epochs[2] != epochs[0]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("copied", [copy.copy, copy.deepcopy, lambda data: pickle.loads(pickle.dumps(data))])
 def test_a_copy_hands_its_epoch_to_persistent_workers_too(folder: Path, copied: Any) -> None:
     data = copied(SpikeWindows(folder, "test", crop=(8, 8), stride=40))

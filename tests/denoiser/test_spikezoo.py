@@ -119,6 +119,7 @@ def test_the_reds_clip_is_upright_and_its_white_is_0_6(reds):
     assert score(rate, picture)["PSNR"] > 30 > 20 > score(rate[::-1], picture)["PSNR"]
 
 
+@pytest.mark.slow
 def test_rate_planes_are_nearer_to_the_reds_picture_than_tfp(reds):
     result = evaluate_spikezoo(reds, ("best",))
     rows = {row["row"]: row for row in result["rows"]}

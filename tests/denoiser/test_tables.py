@@ -162,6 +162,7 @@ def test_other_weights_are_measured_again_and_other_settings_are_refused(
             evaluate_table("table1", other)
 
 
+@pytest.mark.slow
 def test_two_processes_find_what_one_does(result: dict) -> None:
     request = replace(SMALL, rows=("noisy",), jobs=2)
     rows = [r for r in result["scenes"] if r["row"] in request.rows]
@@ -212,6 +213,7 @@ def test_streams_come_from_a_dataset_too(tmp_path: Path) -> None:
         evaluate_table("table1", replace(request, data=tmp_path / "data"))
 
 
+@pytest.mark.slow
 def test_real_recordings_are_judged_by_niqe_or_named_as_absent(tmp_path: Path) -> None:
     spikes = (np.random.default_rng(0).random((120, 250, 400)) < 0.3).astype(np.uint8)
     np.savez(tmp_path / "wall.npz", arr_0=spikes)

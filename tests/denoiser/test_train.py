@@ -133,6 +133,7 @@ def test_weights_of_another_network_are_no_start(small, tmp_path, options):
         train(TrainConfig(**options, out=tmp_path / "run"), progress=False)
 
 
+@pytest.mark.slow
 def test_a_smaller_network_begins_from_what_a_larger_one_has_learnt(small, tmp_path, monkeypatch):
     """Half the channels of `best` begin 5 dB better than untrained ones; without its refine module `paper` goes on."""
     monkeypatch.setattr(training, "NARROWING_PASSES", 6)

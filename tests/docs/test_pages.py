@@ -21,8 +21,10 @@ from tools.page_blocks import COMMANDS, NAMES, PAGES, PYTHON, ROOT, blocks_of, i
 from tools.site.commands import every_command, examples_of
 
 SLOW = {
+    "docs/agents.md",
     "docs/gap.md",
     "docs/howto/train.md",
+    "docs/live.md",
     "docs/play_and_view.md",
     "docs/scenes.md",
     "docs/tutorials/calibrate.md",

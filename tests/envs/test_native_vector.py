@@ -145,6 +145,7 @@ def test_nothing_works_before_the_first_reset_and_after_close() -> None:
         env.reset(seed=0)
 
 
+@pytest.mark.slow
 def test_the_bench_has_a_row_for_each_way() -> None:
     rows = bench_vectors(counts=(1, 2), cases=(("Track-v1", "tfp"),), seconds=0.01, rounds=1)
     assert [(row["how"], row["environments"]) for row in rows] == [

@@ -578,6 +578,7 @@ NUMBERS = (
 )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("number", NUMBERS, ids=str)
 def test_a_number_that_is_halved_or_doubled_fails_its_property(number: Number, monkeypatch: pytest.MonkeyPatch) -> None:
     half, as_it_is, twice = (number.measured(factor, monkeypatch) for factor in (0.5, 1.0, 2.0))

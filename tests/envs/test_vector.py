@@ -83,6 +83,7 @@ def test_nothing_but_closing_again_works_after_close(name: str) -> None:
             use()
 
 
+@pytest.mark.slow
 def test_the_renderer_goes_with_the_last_environment(monkeypatch: pytest.MonkeyPatch) -> None:
     closed: list[str] = []
 

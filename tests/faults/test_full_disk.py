@@ -17,6 +17,7 @@ PAGE = 4096
 """Bytes."""
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("command", WRITINGS)
 def test_a_disk_that_fills_up_ends_every_command_in_a_line(
     command: str,

@@ -24,6 +24,7 @@ def contents(folder: Path) -> dict[str, bytes]:
     return {str(path.relative_to(folder)): path.read_bytes() for path in folder.rglob("*") if path.is_file()}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("command", RESULTS)
 def test_a_result_of_which_the_largest_file_cannot_be_written_leaves_the_folder_as_it_was(
     command: str,

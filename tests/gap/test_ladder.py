@@ -42,6 +42,7 @@ def test_a_model_that_lacks_nothing_has_one_rung(tmp_path: Path) -> None:
     assert len(ladder(campaign, "physical").rungs) == 1
 
 
+@pytest.mark.slow
 def test_the_command_climbs_it_and_says_where_its_files_are(tmp_path: Path, capsys) -> None:
     recordings = [Dark(), *(Flat(radiance=x) for x in (0.1, 0.3))]
     write_campaign(tmp_path / "c", "physical", shape=(16, 16), frames=300, recordings=recordings, seed=5)

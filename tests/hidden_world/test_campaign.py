@@ -110,6 +110,7 @@ def nothing_hidden(tmp_path_factory):
 LAWS = [(m.name, law) for m in MECHANISMS.values() for law in ("", *(other.name for other in m.far))]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("name", "law"), LAWS, ids=[f"{name}/{law}" if law else name for name, law in LAWS])
 def test_every_law_makes_a_readable_campaign_that_differs(name, law, tmp_path, nothing_hidden):
     hidden = draw(MECHANISMS[name], 1e3 if name in RARE else 10.0, stream(1, name), law)

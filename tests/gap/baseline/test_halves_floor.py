@@ -18,6 +18,7 @@ from spikecam_env.gap.verdict.gap import usable_floor
 from spikecam_env.streams import unpack_frames
 
 
+@pytest.mark.slow
 def test_where_nothing_is_wrong_the_gap_is_its_floor_pattern_and_all():
     """Three units of the model against it: gap and floor on the flat held out, of which a fifth is of the pattern."""
     gaps, floors = [], []

@@ -65,6 +65,7 @@ def test_spikes_that_are_missing_at_one_level_are_not_called_a_wrong_label(name)
     assert found(case_from(spikes)) == []
 
 
+@pytest.mark.slow
 def test_the_brightest_label_is_not_to_blame_where_more_of_its_recording_is_off():
     """An effect that takes spikes of bright light alone leaves traces in their timing; a label does not."""
     plain, noisy, shown = spikes_of(), spikes_of(), relabelled("flat-0.65", 0.98)

@@ -159,6 +159,7 @@ def scene(folder: Path, light: Keyframes) -> Path:
     return folder
 
 
+@pytest.mark.slow
 def test_a_moving_scene_is_refused_before_anything_is_simulated(tmp_path: Path) -> None:
     folder = scene(tmp_path / "ball", ball(FRAMES))
     found = diagnose(folder, progress=False)

@@ -5,10 +5,11 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
+import pytest
 from small import MODEL, TWINS, effect, null, recorded
 
 from spikecam_env.gap.baseline.null_model import model_null
-from spikecam_env.gap.candidates.strength import with_effect
+from spikecam_env.gap.candidates.strength import MOST_EXTRAPOLATED, with_effect
 from spikecam_env.gap.compare.distance import effect_size, is_significant, residual, residual_and_misfit
 from spikecam_env.gap.compare.prediction import values_of
 from spikecam_env.gap.fit.candidate import Fit, fit
@@ -27,7 +28,7 @@ def test_a_weak_effect_is_told_by_louder_twins_as_well_as_by_many():
     found = fit(Problem(case, MODEL, without, measured, measured), "dead_time", {"tau_us": 0.02})
     size = effect_size(without, measured, found.prediction.mean - without.mean)
     loud, times = amplified_fit(Problem(case, MODEL, without, measured, measured), found, "dead_time")
-    assert 1 < times <= without.settings.twins.most_extrapolated and loud.parameters == found.parameters
+    assert 1 < times <= MOST_EXTRAPOLATED and loud.parameters == found.parameters
     which = [i for i, c in enumerate(case.conditions) if c.use == "fit"]
     many = predict_by_twins(case, found.model, found.base, without, TWINS, which)
     few = predict_by_twins(case, found.model, found.base, without, 2, which)
@@ -100,6 +101,7 @@ def test_more_twins_say_whether_something_is_left_where_two_cannot():
     assert np.all(sure.prediction.error >= found.prediction.error)
 
 
+@pytest.mark.slow
 def test_a_column_that_few_units_have_is_no_surprise_to_many():
     """Columns of 100 mV, one of them 3 deviations off: none of the first two dozen units has pixels that far out; of
     240 some have.  A larger deviation is still left."""

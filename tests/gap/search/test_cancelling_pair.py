@@ -41,6 +41,7 @@ def test_one_twin_of_both_says_how_strong_they_are(problem):
     assert fit_pair(problem, PAIR[:1]) is None
 
 
+@pytest.mark.slow
 def test_search_finds_them_together(problem):
     rounds = forward_selection(problem, [*PAIR, "comparator_delay"], shipped_templates())
     print([r.fits[0].name for r in rounds if r.fits], rounds[-1].model.effects[-2:])
@@ -50,6 +51,7 @@ def test_search_finds_them_together(problem):
     assert all(sd > 0 for r in rounds[:-1] for sd in r.fits[0].sd.values())
 
 
+@pytest.mark.slow
 def test_one_bend_alone_is_found_alone():
     rounds = forward_selection(
         problem_of(effect("photo_response_nonlinearity", beta=0.02)), [*PAIR], shipped_templates()

@@ -76,6 +76,7 @@ def test_only_a_scene_that_cannot_show_the_second_by_itself_starts_both(problem:
     assert pairs(problem, ["clock_feedthrough", "photodiode_lag"]) == pairs(problem, ["readout_skew"]) == []
 
 
+@pytest.mark.slow
 def test_both_are_found_from_a_grid_of_starts(problem: Problem, monkeypatch: pytest.MonkeyPatch):
     grid = {"span": (0.4, -0.4), "phase_frames": (0.1, 0.35, 0.6, 0.85), "tau_us": (8.0,)}
     known = joint_start.candidate

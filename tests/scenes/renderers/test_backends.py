@@ -36,6 +36,7 @@ def picture(renderer: Renderer, surface: Surface, supersample: int = 2) -> Sprit
     return renderer.render(surface, np.eye(4), CAMERA, Lighting(), WINDOW, supersample)
 
 
+@pytest.mark.slow
 def test_every_backend_agrees_with_embree_to_half_a_percent_of_full_scale() -> None:
     """The bound is the 1/256 to which graphics cards know where between two texels they are."""
     rows = compare_backends((50, 80), repeats=1)
