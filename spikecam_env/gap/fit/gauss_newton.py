@@ -211,7 +211,6 @@ def derivative_step(name: str, key: str, peak: float) -> float:
 
     Args:
         peak: noises by which the effect shows.
-        shows: noises by which the step has to show.
     """
     if (name, key) == WHITE:
         return WHITE_STEP

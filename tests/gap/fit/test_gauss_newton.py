@@ -87,7 +87,7 @@ def test_what_one_parameter_moves_says_how_far_another_of_its_effect_does():
 def test_shapes_are_told_by_steps_that_suit_them():
     """A time constant by half a logarithm, the level from which light spills by a tenth; each is open by twice that."""
     free = [("blooming", "share"), ("blooming", "full"), ("incomplete_reset", "tau_us"), WHITE]
-    assert [derivative_step(*parameter, peak=12.0, shows=6.0) for parameter in free] == [0.5, -0.1, -0.5, -0.2]
+    assert [derivative_step(*parameter, peak=12.0) for parameter in free] == [0.5, -0.1, -0.5, -0.2]
     assert list(prior_sd(free)) == [1.0, 0.2, 1.0, 1.0]
 
 
