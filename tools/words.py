@@ -13,7 +13,7 @@ import tokenize
 from collections.abc import Iterator
 from pathlib import Path
 
-PACKAGES = ("spikecam_env", "scenes", "denoiser", "benchmarks", "tools")
+PACKAGES = ("spikecam_env", "scenes", "denoiser", "benchmarks", "tools", "tests")
 WORDS = 30
 """Longest sentence [words]."""
 LIMITS = {"what": 0.005, "long": 0.002}

@@ -20,8 +20,8 @@ from tools.fit_measured import (
 from tools.real.recordings import MAPS, read_response_and_dark, read_wall, wall_statistics
 from tools.real.two_levels import split_shading, two_levels
 from tools.real.wall_noise import simulate_wall
+from tools.real_recordings import REAL
 
-REAL = Path(__file__).resolve().parents[2].parent / "shared" / "data" / "real"
 needs_real = pytest.mark.skipif(
     not (REAL / "wall.npz").is_file(), reason="the real recordings (../shared/data/real) are not at hand"
 )

@@ -2,16 +2,13 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 from scipy.ndimage import gaussian_filter
 
 from denoiser import denoise
 from spikecam_env.streams import middleTFP
-
-REAL = Path(__file__).parents[2].parent / "shared" / "data" / "real"
+from tools.real_recordings import REAL
 
 
 def recording(name: str) -> np.ndarray:
