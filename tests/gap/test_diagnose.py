@@ -231,7 +231,7 @@ def test_labels_in_another_unit_change_no_bound_and_the_page_says_so(clean, noth
 
 
 def test_no_effort_is_refused(clean):
-    with pytest.raises(InputError, match="effort 0"):
+    with pytest.raises(InputError, match="effort = 0"):
         asked(clean, effort=0)
 
 
