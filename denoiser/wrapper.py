@@ -22,8 +22,9 @@ WARM_UPS = ("black", "noisy")
 class DenoiseObservation(gymnasium.Wrapper, gymnasium.utils.RecordConstructorArgs):
     """Replaces each (K, H, W) block of spikes by the denoised block of the same length, `denoiser_latency` frames late.
 
-    Info: denoiser_latency, by how many frames the block is late; denoised_frames, how many of its last frames are
-    denoised.
+    Info:
+        denoiser_latency, by how many frames the block is late; denoised_frames, how many of its last frames are
+        denoised.
 
     Args:
         env: its observations are blocks of spikes.

@@ -34,6 +34,7 @@ suppress_warnings = ["ref.python"]
 
 autodoc_member_order = "bysource"
 autodoc_inherit_docstrings = False
+autodoc_type_aliases = {name: name for name in ("Floats", "Pictures", "Spikes", "Masks")}  # of attributes
 napoleon_numpy_docstring = False
 napoleon_use_param = False  # entries such as `rows, columns: size` have two names
 napoleon_use_rtype = False

@@ -29,12 +29,16 @@ DrawEpisode = Callable[[np.random.Generator, dict[str, Any]], Episode]
 class AimingEnv(SpikeCameraEnv):
     """An episode (`envs.episode`) before a spike camera.
 
-    Action: the wanted gaze rate, one number an axis in [-1, 1] of `motor.top_px_s`, pan then tilt; then the task's
-        further numbers, if it has any. The motor (`envs.motor`) limits the rate and its change.
-    Reward: "progress" or "distance" of `envs.task`; OUTCOME more for a success that ends the episode.
-    End: terminated when the episode is decided, lost or done (`Episode.end`); truncated after its last step
+    Action:
+        The wanted gaze rate, one number an axis in [-1, 1] of `motor.top_px_s`, pan then tilt; then the task's further
+        numbers, if it has any. The motor (`envs.motor`) limits the rate and its change.
+    Reward:
+        "progress" or "distance" of `envs.task`; OUTCOME more for a success that ends the episode.
+    End:
+        Terminated when the episode is decided, lost or done (`Episode.end`); truncated after its last step
         (`Episode.steps` and `beyond`).
-    Info: that of `SpikeCameraEnv`, and target (2,) float64, its place in the picture [pixels]; distance_px, from the
+    Info:
+        That of `SpikeCameraEnv`, and target (2,) float64, its place in the picture [pixels]; distance_px, from the
         middle; is_success, the task is done as things stand; performance, 1 at best, of the episode if it ended here;
         gaze_rate (2,) float64 [pixels/s].
 

@@ -25,7 +25,8 @@ class RotatingDiskEnv(AimingEnv):
     terminates when the disk's centre leaves the picture.  On the target: within an eighth of the shorter side.
     `gymnasium.make` truncates it after 500 steps (0.5 s at 40 frames a step), or after its `max_episode_steps`.
 
-    Options: centre (x, y) [pixels], drift_px_s (x, y), angle [radians]; the others are drawn.
+    Options:
+        centre (x, y) [pixels], drift_px_s (x, y), angle [radians]; the others are drawn.
 
     The arguments shape, rpm, radius, light, texture, background and texture_seed are those of `scenes.RotatingDisk`.
 

@@ -61,9 +61,11 @@ class SceneEnv(AimingEnv):
     its `max_episode_steps`.  At first the camera, on a mount that drifts slowly, looks past the target by
     `start_offset_px` or half of it.
 
-    Options: start_frame, offset (pan, tilt) [pixels], drift_px_s (pan, tilt) and, of random worlds, seed; the others
-        are drawn.
-    Info: scene_over, whether the episode is truncated because its scene starts over; the others of `AimingEnv`.
+    Options:
+        start_frame, offset (pan, tilt) [pixels], drift_px_s (pan, tilt) and, of random worlds, seed; the others are
+        drawn.
+    Info:
+        scene_over, whether the episode is truncated because its scene starts over; the others of `AimingEnv`.
 
     Args:
         scene: a name of `scenes.catalogue.SCENES`; "random" is another world in every episode.

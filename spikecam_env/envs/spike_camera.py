@@ -62,20 +62,27 @@ class SpikeCameraEnv(gymnasium.Env[Any, NDArray[np.float32]]):
     `sensor`, `scene` and `blocks` are open to look at: `env.unwrapped.sensor.clean_twin()`,
     `env.unwrapped.scene.truth(...)`, `env.unwrapped.blocks.spikes`.
 
-    Observation: by default "spikes", the step's frames, (K, H, W) int8 of 0 and 1; a fresh array each step. With
-        `obs_state` a Dict: picture, gaze, age (`observations.with_state_space`).
-    Action: (2,) float32, gaze rate (pan, tilt) in [-1, 1] of `max_gaze_rate_px_s`; pan is to the right, tilt is down.
+    Observation:
+        By default "spikes", the step's frames, (K, H, W) int8 of 0 and 1; a fresh array each step. With `obs_state` a
+        Dict: picture, gaze, age (`observations.with_state_space`).
+    Action:
+        (2,) float32, gaze rate (pan, tilt) in [-1, 1] of `max_gaze_rate_px_s`; pan is to the right, tilt is down.
         Values beyond are cut, as a motor saturates.
-    Reward: from `judge`, as the end of the episode is.
-    Reset: draws the scene and the camera's unit (fixed pattern, phases, noise) from `np_random`, then exposes the first
-        K frames with the camera at rest. Same seed, same actions: same bits.
-    Options: for this episode, `model` (as below, of the same frame rate), `light`, a factor on the scene's light; the
-        others are the scene's.
-    Info: time_s, frame (end of the block), gaze (2,) float64 [pixels] there, age [frames] of the picture (-1 before the
+    Reward:
+        From `judge`, as the end of the episode is.
+    Reset:
+        Draws the scene and the camera's unit (fixed pattern, phases, noise) from `np_random`, then exposes the first K
+        frames with the camera at rest. Same seed, same actions: same bits.
+    Options:
+        For this episode, `model` (as below, of the same frame rate), `light`, a factor on the scene's light; the others
+        are the scene's.
+    Info:
+        time_s, frame (end of the block), gaze (2,) float64 [pixels] there, age [frames] of the picture (-1 before the
         first valid one); with `ground_truth` also radiance, flow, object_id at the centre of the block and poses, see
         `scenes.protocol.Truth`.
-    Render: `rgb_array`, the share of frames with a spike, over the last blocks of RENDER_FRAMES or more; white is a
-        spike every frame, gamma 2.2.
+    Render:
+        `rgb_array`, the share of frames with a spike, over the last blocks of RENDER_FRAMES or more; white is a spike
+        every frame, gamma 2.2.
 
     Args:
         make_scene: see `MakeScene`; its scenes have this `shape` and the model's frame rate.

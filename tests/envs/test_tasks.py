@@ -202,7 +202,7 @@ def test_learners_are_given_the_horizon_of_a_task_and_it_truncates_nothing_earli
 def test_the_docstring_of_a_task_says_what_a_learner_has_to_know(name: str) -> None:
     text = TASKS[name].__doc__ or ""
     places = [
-        text.find(f"\n    {heading}: ") for heading in ("Scene", "Observation", "Action", "Reward", "End", "Success")
+        text.find(f"\n    {heading}:\n") for heading in ("Scene", "Observation", "Action", "Reward", "End", "Success")
     ]
     assert -1 not in places and places == sorted(places)
     assert "Performance: " in text

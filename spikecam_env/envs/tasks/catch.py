@@ -22,15 +22,21 @@ from spikecam_env.envs.tasks.things import BRIGHT, background, disc_of, number_o
 class Catch(Task):
     """Be where a ball crosses a line.
 
-    Scene: a ball flies towards a bright line, and crosses it 5 to 20 ms after it is first seen.
-    Observation: by default a picture a step, (1, rows, columns) uint8: the share of the step's frames with a spike.
-    Action: one number in [-1, 1]: pan, the wanted gaze rate over the top rate. That is 100 sides/s, reached from rest
-        in 2 ms. A step is 20 frames (0.5 ms).
-    Reward: "progress": 20 times how much closer the place of the crossing has come to the middle column, as a share of
-        half the diagonal; 10 more for the success.
-    End: terminated when the ball crosses; 60 steps at most.
-    Success: the ball crosses within 1/16 side of the middle column. A ball that crosses early crosses near: a motor
-        that starts 2.5 ms after the first picture is in time. Performance: 1 for a success.
+    Scene:
+        A ball flies towards a bright line, and crosses it 5 to 20 ms after it is first seen.
+    Observation:
+        By default a picture a step, (1, rows, columns) uint8: the share of the step's frames with a spike.
+    Action:
+        One number in [-1, 1]: pan, the wanted gaze rate over the top rate. That is 100 sides/s, reached from rest in 2
+        ms. A step is 20 frames (0.5 ms).
+    Reward:
+        "progress": 20 times how much closer the place of the crossing has come to the middle column, as a share of half
+        the diagonal; 10 more for the success.
+    End:
+        Terminated when the ball crosses; 60 steps at most.
+    Success:
+        The ball crosses within 1/16 side of the middle column. A ball that crosses early crosses near: a motor that
+        starts 2.5 ms after the first picture is in time. Performance: 1 for a success.
     """
 
     top_sides_s: float = 100.0

@@ -31,9 +31,11 @@ class TaskEnv(AimingEnv):
 
     `spec.max_episode_steps` is `most_steps`; the task's time is `Task.duration_s`, whatever `frames_per_step` is.
 
-    Options: split, for this episode; episode, its number within the split (train: 0 to 999 999, test: 0 to 999),
-        instead of one drawn from the split. The camera's unit and noise follow from the seed, not from the number.
-    Info: episode_number, which the option `episode` takes (learners keep statistics under the name `episode`).
+    Options:
+        split, for this episode; episode, its number within the split (train: 0 to 999 999, test: 0 to 999), instead of
+        one drawn from the split. The camera's unit and noise follow from the seed, not from the number.
+    Info:
+        episode_number, which the option `episode` takes (learners keep statistics under the name `episode`).
 
     Args:
         task: a name of `tasks.TASKS`, or a `Task`, e.g. `LowLight(mean_interval=(50, 50))`.

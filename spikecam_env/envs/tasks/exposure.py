@@ -24,14 +24,20 @@ from spikecam_env.sensor import Keyframes
 class Exposure(Track):
     """Keep a disc in the middle of the view, and the light on the sensor even.
 
-    Scene: that of `Track`, while the light changes a thousandfold, in 0.2 to 0.4 s to and fro.
-    Observation: by default a picture a step, (1, rows, columns) uint8: the share of the step's frames with a spike.
-    Action: three numbers in [-1, 1]: pan and tilt as of `Track`; the rate of an iris, of 50 decades of light a second.
-    Reward: "progress" as of `Track`, of a closeness that is less by the share of the iris's range (two decades either
-        way) by which the light is off.
-    End: that of `Track`: terminated when the disc's middle leaves the picture; truncated after 500 steps.
-    Success: the disc's middle is within 1/8 side of the picture's, and the light on the sensor within a factor of 2 of
-        the light of `Track`. Performance: share of the 500 steps that end so.
+    Scene:
+        That of `Track`, while the light changes a thousandfold, in 0.2 to 0.4 s to and fro.
+    Observation:
+        By default a picture a step, (1, rows, columns) uint8: the share of the step's frames with a spike.
+    Action:
+        Three numbers in [-1, 1]: pan and tilt as of `Track`; the rate of an iris, of 50 decades of light a second.
+    Reward:
+        "progress" as of `Track`, of a closeness that is less by the share of the iris's range (two decades either way)
+        by which the light is off.
+    End:
+        That of `Track`: terminated when the disc's middle leaves the picture; truncated after 500 steps.
+    Success:
+        The disc's middle is within 1/8 side of the picture's, and the light on the sensor within a factor of 2 of the
+        light of `Track`. Performance: share of the 500 steps that end so.
     """
 
     decades: float = 1.5

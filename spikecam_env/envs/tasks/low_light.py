@@ -18,12 +18,18 @@ from spikecam_env.envs.tasks.track import Track
 class LowLight(Track):
     """Keep a disc in the middle of the view, in little light.
 
-    Scene: that of `Track`, in which a pixel fires every 20 to 200 frames: half a step to five steps.
-    Observation: by default a picture a step, (1, rows, columns) uint8: the share of the step's frames with a spike.
-    Action: that of `Track`: pan and tilt.
-    Reward: that of `Track`.
-    End: that of `Track`: terminated when the disc's middle leaves the picture; truncated after 500 steps.
-    Success: that of `Track`: the disc's middle is within 1/8 side of the picture's. Performance: share of the steps.
+    Scene:
+        That of `Track`, in which a pixel fires every 20 to 200 frames: half a step to five steps.
+    Observation:
+        By default a picture a step, (1, rows, columns) uint8: the share of the step's frames with a spike.
+    Action:
+        That of `Track`: pan and tilt.
+    Reward:
+        That of `Track`.
+    End:
+        That of `Track`: terminated when the disc's middle leaves the picture; truncated after 500 steps.
+    Success:
+        That of `Track`: the disc's middle is within 1/8 side of the picture's. Performance: share of the steps.
     """
 
     mean_interval: tuple[float, float] = (20.0, 200.0)

@@ -15,13 +15,19 @@ from spikecam_env.envs.tasks.read_spin import RPM, ReadSpin
 class ReadDigit(ReadSpin):
     """Look at a spinning disc, and say which digit is on it.
 
-    Scene: a bright disc with a dark digit spins at 1000 to 8000 rpm, and its centre wanders as that of `ReadSpin`.
-        A bar is below the digit, so that a 6 is no 9. Fonts, strokes and slants of tests are not those of training.
-    Observation: by default a picture a step, (1, rows, columns) uint8: the share of the step's frames with a spike.
-    Action: 13 numbers in [-1, 1]: pan, tilt, say, and one for each digit from 0 to 9; as of `ReadSpin`.
-    Reward: "progress" as of `Track`; 10 more for the right answer, and 10 / 9 less for a wrong one.
-    End: terminated by the right answer; truncated after 250 steps. A wrong answer locks answers for a third of these.
-    Success: the right answer. Performance: share of the time that is left then, less 1/9 for each wrong answer.
+    Scene:
+        A bright disc with a dark digit spins at 1000 to 8000 rpm, and its centre wanders as that of `ReadSpin`. A bar
+        is below the digit, so that a 6 is no 9. Fonts, strokes and slants of tests are not those of training.
+    Observation:
+        By default a picture a step, (1, rows, columns) uint8: the share of the step's frames with a spike.
+    Action:
+        13 numbers in [-1, 1]: pan, tilt, say, and one for each digit from 0 to 9; as of `ReadSpin`.
+    Reward:
+        "progress" as of `Track`; 10 more for the right answer, and 10 / 9 less for a wrong one.
+    End:
+        Terminated by the right answer; truncated after 250 steps. A wrong answer locks answers for a third of these.
+    Success:
+        The right answer. Performance: share of the time that is left then, less 1/9 for each wrong answer.
     """
 
     radius: float = 0.25

@@ -24,16 +24,22 @@ LOCK_SHARE = 1 / 3
 class ReadSpin(Task):
     """Look at a spinning disc, and say how fast it spins.
 
-    Scene: a dark disc with one bright sector spins at 1000, 2000, 4000 or 8000 rpm. Its centre wanders at 0.05 to 0.2
-        of the gaze's top rate. It may leave the picture and come back.
-    Observation: by default a picture a step, (1, rows, columns) uint8: the share of the step's frames with a spike.
-    Action: seven numbers in [-1, 1]: pan, tilt, say, and one for each speed. A say above 0 gives an answer: the speed
-        with the largest number. An answer counts if the disc's centre is within 1/8 side of the picture's middle as
-        the step begins, and is ignored otherwise. A step is 40 frames (1 ms).
-    Reward: "progress" as of `Track`; 10 more for the right answer, and 10 / 3 less for a wrong one.
-    End: terminated by the right answer; truncated after 250 steps. A wrong answer locks answers for a third of these.
-    Success: the right answer. Performance: share of the time that is left then, less 1/3 for each wrong answer. So a
-        guess is worth nothing on average, or less (formula scoring: 1 / (answers - 1) for a wrong answer).
+    Scene:
+        A dark disc with one bright sector spins at 1000, 2000, 4000 or 8000 rpm. Its centre wanders at 0.05 to 0.2 of
+        the gaze's top rate. It may leave the picture and come back.
+    Observation:
+        By default a picture a step, (1, rows, columns) uint8: the share of the step's frames with a spike.
+    Action:
+        Seven numbers in [-1, 1]: pan, tilt, say, and one for each speed. A say above 0 gives an answer: the speed with
+        the largest number. An answer counts if the disc's centre is within 1/8 side of the picture's middle as the step
+        begins, and is ignored otherwise. A step is 40 frames (1 ms).
+    Reward:
+        "progress" as of `Track`; 10 more for the right answer, and 10 / 3 less for a wrong one.
+    End:
+        Terminated by the right answer; truncated after 250 steps. A wrong answer locks answers for a third of these.
+    Success:
+        The right answer. Performance: share of the time that is left then, less 1/3 for each wrong answer. So a guess
+        is worth nothing on average, or less (formula scoring: 1 / (answers - 1) for a wrong answer).
     """
 
     duration_s: float = 0.25

@@ -20,12 +20,18 @@ OTHERS = ("rings", "halves", "islands")
 class Saccade(Task):
     """Look at the disc with spokes, and hold it.
 
-    Scene: four discs with different textures turn and bounce, at 0.2 to 0.5 of the gaze's top rate. One has spokes.
-    Observation: by default a picture a step, (1, rows, columns) uint8: the share of the step's frames with a spike.
-    Action: that of `Track`: pan and tilt.
-    Reward: "progress" as of `Track`, towards the disc with spokes; 10 more for the success.
-    End: terminated by the success; truncated after 200 steps. A disc that leaves the picture may come back.
-    Success: its middle is within 1/16 side of the picture's for 20 ms without a break. Performance: 1 for a success.
+    Scene:
+        Four discs with different textures turn and bounce, at 0.2 to 0.5 of the gaze's top rate. One has spokes.
+    Observation:
+        By default a picture a step, (1, rows, columns) uint8: the share of the step's frames with a spike.
+    Action:
+        That of `Track`: pan and tilt.
+    Reward:
+        "progress" as of `Track`, towards the disc with spokes; 10 more for the success.
+    End:
+        Terminated by the success; truncated after 200 steps. A disc that leaves the picture may come back.
+    Success:
+        Its middle is within 1/16 side of the picture's for 20 ms without a break. Performance: 1 for a success.
     """
 
     duration_s: float = 0.2

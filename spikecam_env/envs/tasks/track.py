@@ -16,13 +16,19 @@ from spikecam_env.envs.tasks.things import background, disc_of, number_of, wande
 class Track(Task):
     """Keep a disc in the middle of the view.
 
-    Scene: a disc with bright islands turns and bounces before a soft background, at 0.2 to 0.8 of the gaze's top rate.
-    Observation: by default a picture a step, (1, rows, columns) uint8: the share of the step's frames with a spike.
-    Action: two numbers in [-1, 1]: pan (to the right) and tilt (down), the wanted gaze rate over the top rate. That is
-        10 sides/s, reached from rest in 10 ms. A step is 40 frames (1 ms).
-    Reward: "progress": 20 times how much closer the disc has come to the middle, as a share of half the diagonal.
-    End: terminated when the disc's middle leaves the picture; truncated after 500 steps.
-    Success: the disc's middle is within 1/8 side of the picture's. Performance: share of the 500 steps that end so.
+    Scene:
+        A disc with bright islands turns and bounces before a soft background, at 0.2 to 0.8 of the gaze's top rate.
+    Observation:
+        By default a picture a step, (1, rows, columns) uint8: the share of the step's frames with a spike.
+    Action:
+        Two numbers in [-1, 1]: pan (to the right) and tilt (down), the wanted gaze rate over the top rate. That is 10
+        sides/s, reached from rest in 10 ms. A step is 40 frames (1 ms).
+    Reward:
+        "progress": 20 times how much closer the disc has come to the middle, as a share of half the diagonal.
+    End:
+        Terminated when the disc's middle leaves the picture; truncated after 500 steps.
+    Success:
+        The disc's middle is within 1/8 side of the picture's. Performance: share of the 500 steps that end so.
     """
 
     speed: tuple[float, float] = (0.2, 0.8)
