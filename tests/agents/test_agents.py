@@ -173,6 +173,7 @@ def test_the_tracker_is_as_good_as_the_oracle(task: str, episodes: int, obs: str
     env.close()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "task, least, episodes",
     [
@@ -243,6 +244,7 @@ def test_a_learning_curve_has_a_point_for_every_agent_on_the_way(tmp_path: Path)
     assert studies.read_record(tmp_path / studies.RECORD)[0].along == learned.along
 
 
+@pytest.mark.slow
 def test_one_training_is_played_at_every_light(tmp_path: Path) -> None:
     wanted = studies.cases(
         ["LowLight-v1"], ["tfp", "tracker"], [50, 100], [3], 2, 1, trained=(20, 200), shape=(16, 16), imitate=True

@@ -24,6 +24,7 @@ def set_back(monkeypatch):
     monkeypatch.setattr(gpu, "RUNS", gpu.RUNS)
 
 
+@pytest.mark.slow
 def test_the_dry_run_measures_every_part(tmp_path, capsys):
     gpu.main(["--cpu", "--quick", "--out", str(tmp_path / "gpu.json")])
     tables = json.loads((tmp_path / "gpu.json").read_text())["tables"]

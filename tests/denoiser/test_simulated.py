@@ -190,6 +190,7 @@ def test_the_mixture_of_scenes(scenes, name):
     assert about / within < found < about * within
 
 
+@pytest.mark.slow
 def test_a_stream_begins_anew_at_its_age(bank):
     streams = SimulatedStreams(8, 16, seed=2, bank=bank)
     ages, seen = torch.full((8,), -1), []

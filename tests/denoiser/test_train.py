@@ -62,6 +62,7 @@ def test_a_resumed_run_goes_on(small, tmp_path, monkeypatch):
     assert seeds == [0, 2] and not same(half, whole)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("mode, passes", [("paper", 13), ("best", 3)])
 def test_a_run_leaves_weights_and_a_curve(small, tmp_path, mode, passes):
     weights_after(tmp_path, 3, mode, validate_every=2, validate_passes=passes)
@@ -150,6 +151,7 @@ def test_a_smaller_network_begins_from_what_a_larger_one_has_learnt(small, tmp_p
     assert torch.allclose(weights["stem.0.0.weight"], shipped["stem.0.0.weight"], atol=1e-6)
 
 
+@pytest.mark.slow
 def test_a_network_learns_the_rates_of_a_teacher(small, tmp_path):
     """From its own weights there is nothing to learn; the record names the teacher."""
     options = {"start": "best", "validate_every": 2}

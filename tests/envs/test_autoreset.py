@@ -71,6 +71,7 @@ def test_every_mode_has_the_bits_of_gymnasium_s_vector(mode: AutoresetMode, obs:
     same(ours, played(sync(mode=mode, **options)))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("mode", [AutoresetMode.SAME_STEP, AutoresetMode.DISABLED])
 def test_rendered_scenes_and_tasks_begin_anew_with_the_same_bits(mode: AutoresetMode) -> None:
     fan = {"shape": (16, 16), "max_episode_steps": 2, "obs": "tfp"}

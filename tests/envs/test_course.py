@@ -35,6 +35,7 @@ def test_a_course_is_the_episode_that_the_environment_plays(name: str) -> None:
     assert terminated or truncated
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ENVIRONMENTS)
 def test_the_oracle_follows_every_scene_and_doing_nothing_does_not(name: str) -> None:
     env: Any = gymnasium.make(name, shape=(64, 64)).unwrapped

@@ -36,6 +36,7 @@ def test_every_scene_of_the_catalogue_has_an_id() -> None:
     assert {ENVIRONMENTS[name][1]["scene"] for name in NAMED} | {"random"} == set(SCENES)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", OF_IDS)
 def test_every_id_starts_with_its_target_in_view_and_steps_and_one_of_each_kind_passes_check_env(name: str) -> None:
     """The ids of a kind have the code of one class, which their last assertion here finds again: `check_env`, which

@@ -29,6 +29,7 @@ def test_check_env_is_clean(name: str) -> None:
         check_env(gymnasium.make(name, shape=(24, 32), frames_per_step=8).unwrapped, skip_render_check=True)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", SMALL_TASKS)
 def test_the_oracle_solves_it_and_doing_nothing_does_not(name: str) -> None:
     env = gymnasium.make(name, split="test")
@@ -158,6 +159,7 @@ def test_a_wrong_answer_costs_a_third_of_the_time_and_as_much_as_makes_guesses_w
     assert courses[first].worth - courses[first - 1].worth == pytest.approx(-cost * 10 / 20, abs=0.06)  # OUTCOME
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", READING)
 def test_guessing_stays_at_the_bottom(name: str) -> None:
     """Steered by the oracle, answers at random: the mean of 100 episodes, whose standard error is below 0.1."""

@@ -121,6 +121,7 @@ def test_a_copy_goes_on_as_the_original_does(copied: Any) -> None:
         np.testing.assert_array_equal(env.step(action)[0], other.step(action)[0])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", ["embree", "egl-software"])
 def test_a_renderer_in_another_process_draws_the_same_bits(kind: str) -> None:
     try:

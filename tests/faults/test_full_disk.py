@@ -93,7 +93,7 @@ def test_hdf5_survives_a_full_disk_up_to_the_end_of_the_process(size: int, tmp_p
         "except OSError as error:\n"
         "    print(type(error).__name__, error)\n"
     )
-    done = subprocess.run([sys.executable, "-c", code], cwd=tmp_path, capture_output=True, text=True)
+    done = subprocess.run([sys.executable, "-B", "-c", code], cwd=tmp_path, capture_output=True, text=True)
     assert done.returncode == 0 and not done.stderr, (done.returncode, done.stderr[-500:])
     assert "WriteError cannot write x.h5" in done.stdout
     assert not tree(tmp_path)

@@ -209,13 +209,19 @@ def tree(folder: Path) -> set[str]:
 
 @contextmanager
 def files_up_to(size: int) -> Iterator[None]:
-    """As `ulimit -f` does, in bytes."""
+    """As `ulimit -f` does, in bytes.
+
+    Python keeps no compiled modules meanwhile, nor in processes that start: it would keep their first bytes.
+    """
     soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
-    resource.setrlimit(resource.RLIMIT_FSIZE, (size, hard))
-    try:
-        yield
-    finally:
-        resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("PYTHONDONTWRITEBYTECODE", "1")
+        patch.setattr(sys, "dont_write_bytecode", True)
+        resource.setrlimit(resource.RLIMIT_FSIZE, (size, hard))
+        try:
+            yield
+        finally:
+            resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
 
 
 def python(code: str) -> list[str]:

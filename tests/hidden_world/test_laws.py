@@ -80,6 +80,7 @@ def test_every_far_law_has_a_claim():
     assert all(law.source for m in MECHANISMS.values() for law in m.far)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("name", "law"), FAR, ids=[f"{name}/{law}" for name, law in FAR])
 def test_far_law_is_as_computed_and_the_near_one_is_not(name, law):
     mechanism = MECHANISMS[name]

@@ -77,6 +77,7 @@ def test_false_alarms_have_their_nominal_rate_however_few_the_twins(twins):
     assert 0.02 < share < allowed
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("twins, recordings", [(2, 1), (4, 10)])
 def test_an_effect_that_scatters_is_not_held_against_its_own_few_twins(twins, recordings):
     """300 campaigns of 200 statistics of a model whose effect scatters three times the null: alarms as often as asked

@@ -20,6 +20,7 @@ from spikecam_env.gap.search.neighbours import is_missed, try_more_draws
 from spikecam_env.gap.unit.refit import constrained_refit
 
 
+@pytest.mark.slow
 def test_a_weak_effect_is_told_by_louder_twins_as_well_as_by_many():
     """A dead time that shows by some noises: two twins of it some times as strong, or all twelve of it as it is."""
     case = recorded(effect("dead_time", tau_us=0.02))
@@ -40,6 +41,7 @@ def test_a_weak_effect_is_told_by_louder_twins_as_well_as_by_many():
     np.testing.assert_allclose(louder.mean - without.mean, np.nan_to_num(draws), atol=1e-9)
 
 
+@pytest.mark.slow
 def test_what_slow_pixels_do_under_a_severe_noise_is_open_where_they_are_not_known():
     """Dark levels all alike, as of pixels that have locked to the noise, against those of a fresh unit; bright light
     does not depend on them."""

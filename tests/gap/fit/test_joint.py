@@ -16,6 +16,7 @@ from spikecam_env.gap.twins.budget import Budget
 NOTHING = Prediction(np.zeros(0), np.zeros(0), np.zeros(0))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", [1, 12])
 def test_noise_of_the_unit_is_found_beside_common_noise(seed):
     """3 mV in common take a fifth of the noise that the refit assigns to the unit."""

@@ -87,6 +87,7 @@ def estimates(found: Fit) -> dict[str, Estimate]:
     return {key: Estimate(values[key], sd, interval_of(NAME, key, values[key], sd)) for key, sd in known.items()}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("fraction, tau", STOPPED_AT)
 def test_ninety_percent_intervals_hold_where_finer_strengths_were_skipped(fraction: float, tau: float):
     """And they are no wider than twice those of a fit that was refined, as one step goes nearly all of the way."""

@@ -92,6 +92,7 @@ def test_there_is_a_made_up_diagnosis_of_every_verdict() -> None:
     assert set(made_up.EVERY) == set(VERDICTS) == set(SECTIONS)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("verdict", VERDICTS)
 def test_a_page_nests_opens_by_its_verdict_and_has_its_sections(verdict: str) -> None:
     page = Page(written(verdict))

@@ -87,6 +87,7 @@ def test_the_loudest_group_stands_out_however_quiet_it_is():
     assert groups_that_stand_out(null, np.array([50.0, -6.5, 7.0])) == {"rates", "moving", "step"}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "hidden",
     [

@@ -64,6 +64,7 @@ def clean() -> dict[str, Bound]:
     return bounds_of(recorded(), (*COUNTED, "frame_threshold_noise"))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", COUNTED)
 def test_no_bound_of_what_is_counted_lets_expect_fewer_than_three(name, clean):
     """Of events at a rate p, one campaign of N chances in twenty has none where p N = 3.0 (the rule of three)."""
@@ -83,6 +84,7 @@ def test_false_and_missed_spikes_far_below_the_noise_are_not_excluded(clean):
     assert found["spurious_spikes"].below > 5e-8 and found["missed_spikes"].below > 5e-7
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["frame_threshold_noise", "missed_spikes"])
 def test_an_effect_at_its_bound_is_not_excluded(name, clean):
     """One whose statistics go with its square, and one of single events, in two other cameras."""
