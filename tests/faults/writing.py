@@ -15,6 +15,7 @@ from types import SimpleNamespace
 
 import made_up
 import numpy as np
+import pytest
 from pytest import MonkeyPatch
 
 from denoiser.live.session import Session
