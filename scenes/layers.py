@@ -493,6 +493,17 @@ def _split_places(
 
 
 @njit(inline="always")
+def _fetch_corners(table: Any, below: np.uint32, seen: NDArray[np.uint32], corners: Any) -> None:
+    """Values of a table at the cells seen, and at their right, lower and lower right neighbours."""
+    here, right, lower, lower_right = corners
+    to_right = np.uint32(1)
+    for i in range(len(seen)):
+        cell = seen[i]
+        here[i], right[i] = table[cell], table[cell + to_right]
+        lower[i], lower_right[i] = table[cell + below], table[cell + below + to_right]
+
+
+@njit(inline="always")
 def _add_tints(
     cells: NDArray[np.uint32],
     below: np.uint32,
@@ -505,12 +516,9 @@ def _add_tints(
 ) -> None:
     """Add light and coverage of the cells seen, each in steps of the tints."""
     (right_share, lower_share), (light_step, cover_step) = shares, steps
-    to_right, bits, half = np.uint32(1), np.uint32(0xFFFF), np.uint32(16)
+    bits, half = np.uint32(0xFFFF), np.uint32(16)
     here, right, lower, lower_right = corners
-    for i in range(len(seen)):
-        cell = seen[i]
-        here[i], right[i] = cells[cell], cells[cell + to_right]
-        lower[i], lower_right[i] = cells[cell + below], cells[cell + below + to_right]
+    _fetch_corners(cells, below, seen, corners)
     for i in range(len(seen)):
         high, low = np.float32(np.int32(here[i] & bits)), np.float32(np.int32(lower[i] & bits))
         high += right_share[i] * (np.float32(np.int32(right[i] & bits)) - high)
@@ -535,13 +543,10 @@ def _add_distance(
     away: Pictures,
 ) -> None:
     """Add weight x the distance now of the cells seen."""
-    (right_share, lower_share), (x, y), to_right = shares, places, np.uint32(1)
+    (right_share, lower_share), (x, y) = shares, places
     here, right, lower, lower_right = corners
     now_x, now_y, now_rest, nearer = now
-    for i in range(len(seen)):
-        cell = seen[i]
-        here[i], right[i] = depths[cell], depths[cell + to_right]
-        lower[i], lower_right[i] = depths[cell + below], depths[cell + below + to_right]
+    _fetch_corners(depths, below, seen, corners)
     for i in range(len(seen)):
         high = here[i] + right_share[i] * (right[i] - here[i])
         low = lower[i] + right_share[i] * (lower_right[i] - lower[i])
