@@ -7,6 +7,7 @@ import sys
 from pathlib import Path
 
 import pytest
+from PIL import Image
 
 from spikecam_env import __version__
 from spikecam_env.cli.first_words import check_words
@@ -32,6 +33,13 @@ PROJECT = tomllib.loads(text_of("pyproject.toml"))["project"]
 def test_the_citation_is_of_this_version() -> None:
     assert f"\nversion: {__version__}\n" in text_of("CITATION.cff")
     assert f"\nlicense: {PROJECT['license']}\n" in text_of("CITATION.cff")
+
+
+def test_the_picture_at_the_top_of_the_readme_moves_and_loads_at_once() -> None:
+    [name] = re.findall(r"!\[[^]]*\]\(([^)]*)\)", text_of("README.md"))
+    with Image.open(ROOT / name) as picture:
+        print(f"{name}: {picture.n_frames} pictures, {(ROOT / name).stat().st_size} bytes")
+        assert picture.n_frames > 1 and (ROOT / name).stat().st_size < 3_000_000
 
 
 def test_hosted_ci_runs_every_python_that_is_declared_and_no_other() -> None:
