@@ -36,6 +36,7 @@ from denoiser.training_options import TrainingOptions
 from denoiser.training_record import training_record
 from denoiser.weights import load_weights, save_weights
 from spikecam_env.errors import InputError
+from spikecam_env.numbers import WholeRange
 from spikecam_env.run_folder import run_folder
 from spikecam_env.torch_settings import torch_settings
 
@@ -66,7 +67,7 @@ class TrainConfig(TrainingOptions):
     teacher: str | None = None
     """Not of `paper`: weights whose rates the network is to learn instead of the light, a file or "best"."""
 
-    counts = TrainingOptions.counts | {"patch": (16, 128), "validate_passes": (1, 10**6)}
+    ranges = TrainingOptions.ranges | {"patch": WholeRange(16, 128), "validate_passes": WholeRange(1, 10**6)}
     flags = ("resume", "refine", "compiled")
 
     def __post_init__(self) -> None:

@@ -8,12 +8,9 @@ from pathlib import Path
 from typing import ClassVar
 
 from denoiser.captured import checked_compiler
-from spikecam_env.checked import checked_number, checked_whole
 from spikecam_env.errors import InputError
+from spikecam_env.numbers import Range, WholeRange
 from spikecam_env.sensor.kernels.cuda import checked_device
-
-_AMOUNTS = {"lr": 1.0, "minutes": 1e6, "save_every_s": 1e9}
-"""Options that are numbers above 0, with the most."""
 
 
 @dataclass(frozen=True)
@@ -45,22 +42,25 @@ class TrainingOptions:
     compiled: bool = False
     """The simulated light by `torch.compile`, on a processor too; a GPU always does."""
 
-    counts: ClassVar[dict[str, tuple[int, int]]] = {
-        "steps": (1, 10**9),
-        "batch": (1, 65_536),
-        "seed": (0, 2**62),
-        "threads": (1, 1024),
-        "validate_every": (1, 10**9),
+    ranges: ClassVar[dict[str, Range]] = {
+        "steps": WholeRange(1, 10**9),
+        "batch": WholeRange(1, 65_536),
+        "seed": WholeRange(0, 2**62),
+        "threads": WholeRange(1, 1024),
+        "validate_every": WholeRange(1, 10**9),
+        "lr": Range(0, 1, above=True),
+        "minutes": Range(0, 1e6, above=True),
+        "save_every_s": Range(0, 1e9, above=True),
     }
-    """Options that are whole numbers, with the least and the most; the seed of a validation is above the seed."""
+    """Ranges of the options that are numbers; the seed of a validation is above the seed."""
     flags: ClassVar[tuple[str, ...]] = ("resume", "compiled")
 
     def __post_init__(self) -> None:
-        for name, (least, most) in self.counts.items():
-            object.__setattr__(self, name, checked_whole(getattr(self, name), name, least, most))
-        for name, highest in _AMOUNTS.items():
+        for name, allowed in self.ranges.items():
             if name != "minutes" or self.minutes is not None:
-                checked_number(getattr(self, name), name, 0.0, highest, above=True)
+                number = allowed.check(getattr(self, name), name)
+                if isinstance(allowed, WholeRange):
+                    object.__setattr__(self, name, number)
         for name in self.flags:
             if not isinstance(getattr(self, name), bool):
                 raise InputError(f"{name} is {getattr(self, name)!r}; it must be True or False")

@@ -32,6 +32,7 @@ from denoiser.simulated import UNIT_SHAPE, Bank, SimulatedStreams
 from denoiser.training_loop import RUN_FILE, learn, save_progress
 from denoiser.training_options import TrainingOptions
 from denoiser.training_record import training_record
+from spikecam_env.numbers import WholeRange
 from spikecam_env.run_folder import run_folder
 from spikecam_env.torch_settings import torch_settings
 
@@ -55,7 +56,7 @@ class ReconstructorConfig(TrainingOptions):
     frames_a_step: int = 12
     """Frames by which the streams go on."""
 
-    counts = TrainingOptions.counts | {"patch": (1, min(UNIT_SHAPE)), "frames_a_step": (1, WINDOW)}
+    ranges = TrainingOptions.ranges | {"patch": WholeRange(1, min(UNIT_SHAPE)), "frames_a_step": WholeRange(1, WINDOW)}
 
     def __post_init__(self) -> None:
         self.recipe()
