@@ -9,7 +9,7 @@ import os
 import tempfile
 import time
 from dataclasses import replace
-from pathlib import Path
+from functools import partial
 from typing import Any
 
 import tyro
@@ -67,15 +67,5 @@ def _row(name: str, plan: Plan, wall_s: float, built: Built | None) -> dict[str,
     }
 
 
-def main(out: Path | None = None, json: bool = False) -> None:
-    """Print frames a second of a dataset into files, and the share of each part.
-
-    Args:
-        out: file for the figures, as JSON.
-        json: print the figures as JSON, and no table.
-    """
-    print_figures(bench_dataset, out, json)
-
-
 if __name__ == "__main__":
-    tyro.cli(main)
+    tyro.cli(partial(print_figures, bench_dataset), description=__doc__)

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Iterable
-from pathlib import Path
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -64,15 +64,5 @@ def _seconds_a_step(model: SensorModel, shape: tuple[int, int], level: float, se
             return best / (FRAMES * light.size)
 
 
-def main(out: Path | None = None, json: bool = False) -> None:
-    """Print the cost of each effect over the base model.
-
-    Args:
-        out: file for the figures, as JSON.
-        json: print the figures as JSON, and no table.
-    """
-    print_figures(bench_effects, out, json)
-
-
 if __name__ == "__main__":
-    tyro.cli(main)
+    tyro.cli(partial(print_figures, bench_effects), description=__doc__)

@@ -8,8 +8,8 @@ from __future__ import annotations
 import time
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass
+from functools import partial
 from multiprocessing import get_context
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -137,15 +137,5 @@ def _rms(key: list[NDArray[np.float32]], other: list[NDArray[np.float32]], cover
     return float(np.sqrt(np.mean(np.concatenate(squares))))
 
 
-def main(out: Path | None = None, json: bool = False) -> None:
-    """Print the speed and the error of each back-end of this machine.
-
-    Args:
-        out: file for the figures, as JSON.
-        json: print the figures as JSON, and no table.
-    """
-    print_figures(bench_renderers, out, json)
-
-
 if __name__ == "__main__":
-    tyro.cli(main)
+    tyro.cli(partial(print_figures, bench_renderers), description=__doc__)

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Iterable
-from pathlib import Path
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -223,15 +223,5 @@ def _rms(errors: list[NDArray[np.float64]]) -> float:
     return 100 * float(np.sqrt(np.mean(np.square(np.concatenate(errors)))))
 
 
-def main(out: Path | None = None, json: bool = False) -> None:
-    """Print the speed of scenes, the error of their light, and the error of their flow.
-
-    Args:
-        out: file for the figures, as JSON.
-        json: print the figures as JSON, and no table.
-    """
-    print_figures(bench_scenes, out, json)
-
-
 if __name__ == "__main__":
-    tyro.cli(main)
+    tyro.cli(partial(print_figures, bench_scenes), description=__doc__)

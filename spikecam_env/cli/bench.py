@@ -54,13 +54,13 @@ class Bench:
         print_figures(getattr(import_module(module), name), self.out, self.json)
 
 
-def print_figures(measure: Callable[[], Rows | dict[str, Rows]], out: Path | None, as_json: bool) -> None:
+def print_figures(measure: Callable[[], Rows | dict[str, Rows]], out: Path | None = None, json: bool = False) -> None:
     """Measure, print the figures under the name of the machine, and write them.
 
     Args:
         measure: returns rows, or tables of rows by title.
         out: file for the figures, as JSON.
-        as_json: print JSON in place of tables.
+        json: print the figures as JSON, and no table.
     """
     from spikecam_env.bench.machine import machine
     from spikecam_env.cli.files import json_text, write_json
@@ -69,11 +69,11 @@ def print_figures(measure: Callable[[], Rows | dict[str, Rows]], out: Path | Non
 
     if out is not None:
         check_file(out)
-    if not as_json:
+    if not json:
         print(machine())
     rows = measure()
     figures = {"machine": machine(), "rows": rows}
-    if as_json:
+    if json:
         print(json_text(figures))
     else:
         for title, part in rows.items() if isinstance(rows, dict) else [("", rows)]:
@@ -82,5 +82,5 @@ def print_figures(measure: Callable[[], Rows | dict[str, Rows]], out: Path | Non
             print(table(part))
     if out is not None:
         write_json(out, figures)
-        if not as_json:
+        if not json:
             print(f"wrote {out}")
