@@ -27,14 +27,9 @@ from scenes.painted_disk import PlacedDisc, Plane, Texels, paint_tile, prefilter
 from scenes.planes import PlanarScene, painted_planes
 from scenes.protocol import FRAME_RATES_HZ, MOST_LIGHT, MOST_PLACE, Gaze, Truth
 from scenes.textures import Texture, dead_leaves, fractal_noise
-from spikecam_env.checked import (
-    LARGEST_DERIVED_SEED,
-    MOST_RPM,
-    checked_number,
-    checked_seed,
-    checked_shape,
-)
+from spikecam_env.checked import LARGEST_DERIVED_SEED, checked_number, checked_seed, checked_shape
 from spikecam_env.errors import InputError
+from spikecam_env.numbers import MOST_RPM
 from spikecam_env.types import Floats, Pictures
 
 MOST_RADIUS = 6000.0

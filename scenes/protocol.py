@@ -13,8 +13,9 @@ from typing import TYPE_CHECKING, Any, Protocol, runtime_checkable
 import numpy as np
 from numpy.typing import NDArray
 
-from spikecam_env.checked import LARGEST_COUNT, checked_number
+from spikecam_env.checked import checked_number
 from spikecam_env.errors import InputError
+from spikecam_env.numbers import LARGEST_COUNT
 from spikecam_env.types import Pictures
 
 if TYPE_CHECKING:

@@ -13,27 +13,7 @@ from pathlib import Path
 from typing import Any
 
 from spikecam_env.errors import InputError, shown
-from spikecam_env.numbers import (
-    LARGEST_COUNT as LARGEST_COUNT,
-)
-from spikecam_env.numbers import (
-    LARGEST_SEED as LARGEST_SEED,
-)
-from spikecam_env.numbers import (
-    MOST_PIXELS as MOST_PIXELS,
-)
-from spikecam_env.numbers import (
-    MOST_RPM as MOST_RPM,
-)
-from spikecam_env.numbers import (
-    Range,
-    WholeRange,
-    as_whole,
-    with_value,
-)
-from spikecam_env.numbers import (
-    as_number as as_number,
-)
+from spikecam_env.numbers import LARGEST_COUNT, LARGEST_SEED, MOST_PIXELS, Range, WholeRange, as_whole, with_value
 
 LARGEST_DERIVED_SEED = 2**128 - 1
 """Largest seed of a sensor, which may be made from a user's by arithmetic."""

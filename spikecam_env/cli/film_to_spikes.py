@@ -10,11 +10,10 @@ from typing import TYPE_CHECKING, Any, Literal
 
 import tyro
 
-from spikecam_env.checked import LARGEST_COUNT
 from spikecam_env.cli.camera import CameraOptions
 from spikecam_env.cli.options import Size
 from spikecam_env.errors import InputError
-from spikecam_env.numbers import Count, Positive, Seed, Whole
+from spikecam_env.numbers import LARGEST_COUNT, Count, Positive, Seed, Whole
 
 if TYPE_CHECKING:
     from scenes import VideoScene

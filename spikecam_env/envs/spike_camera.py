@@ -18,20 +18,14 @@ from scenes.painted_disk import Plane
 from scenes.planes import PlanarScene, painted_planes
 from scenes.protocol import MOST_LIGHT, Gaze, Scene
 from scenes.renderers.shared import register_user, release_user
-from spikecam_env.checked import (
-    as_number,
-    checked_memory,
-    checked_number,
-    checked_seed,
-    checked_shape,
-    checked_switch,
-)
+from spikecam_env.checked import checked_memory, checked_number, checked_seed, checked_shape, checked_switch
 from spikecam_env.envs.action import checked_action
 from spikecam_env.envs.keywords import check_keywords
 from spikecam_env.envs.motor import turned
 from spikecam_env.envs.observations import Blocks, CameraView, Observation, observation, with_state, with_state_space
 from spikecam_env.envs.reset_options import as_dictionary
 from spikecam_env.errors import InputError, NotReadyError, OwnCodeError, shown, unknown_name
+from spikecam_env.numbers import as_number
 from spikecam_env.sensor import Keyframes, SensorModel, SpikeSensor, step_together
 
 MakeScene = Callable[[np.random.Generator, dict[str, Any]], Scene]

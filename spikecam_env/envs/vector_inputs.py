@@ -13,10 +13,11 @@ import numpy as np
 from gymnasium.vector import AutoresetMode
 from numpy.typing import NDArray
 
-from spikecam_env.checked import LARGEST_SEED, checked_count, checked_seed
+from spikecam_env.checked import checked_count, checked_seed
 from spikecam_env.envs.action import finite_numbers
 from spikecam_env.envs.reset_options import as_dictionary
 from spikecam_env.errors import InputError, shown, unknown_name
+from spikecam_env.numbers import LARGEST_SEED
 
 RESET_MASK = "reset_mask"
 """Option of `reset` that selects environments, as gymnasium names it."""

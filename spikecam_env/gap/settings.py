@@ -122,7 +122,7 @@ class Judging:
         0.02,
         "p, adjusted",
         "Below it, recordings and model disagree.",
-        "one false alarm in fifty campaigns; 2.0 % of 200 by `python -m benchmarks.moderated_variances`",
+        "one false alarm in fifty campaigns; 2.0 % of 200 were measured (benchmarks/moderated_variances.py, 0.1.0)",
         most=1.0,
     )
     gate: float = setting(
@@ -158,7 +158,7 @@ class Baseline:
         1e-3,
         "p, of a recording",
         "Below it, a window of a static recording moves (Bonferroni).",
-        "`python -m benchmarks.motion_limits`",
+        "0 of 140 static recordings are called moving (docs/gap.md)",
         most=1.0,
     )
     least_contrast: float = setting(

@@ -20,8 +20,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from spikecam_env.checked import as_number
 from spikecam_env.errors import InputError, OwnCodeError, shown
+from spikecam_env.numbers import as_number
 from spikecam_env.own_code import line_in, own_code
 from spikecam_env.sensor.effects.base import (
     NEW_CLASS_CHECKS,

@@ -31,7 +31,7 @@ SLOW = {
     "docs/tutorials/denoise.md",
     "docs/tutorials/first_diagnosis.md",
 }
-"""Pages that take ten seconds or more."""
+"""Pages that take long."""
 LONGEST_S = 300
 """In which a page is done, on a busy machine too: a command of it that goes on for ever is an error, and is said so."""
 

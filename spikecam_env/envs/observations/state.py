@@ -9,7 +9,7 @@ from gymnasium import spaces
 from numpy.typing import ArrayLike, NDArray
 
 from scenes.protocol import MOST_PLACE
-from spikecam_env.checked import LARGEST_COUNT
+from spikecam_env.numbers import LARGEST_COUNT
 
 
 def with_state_space(picture: spaces.Space[Any]) -> spaces.Dict:

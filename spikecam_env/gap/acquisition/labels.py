@@ -18,8 +18,8 @@ from typing import Any
 
 import numpy as np
 
-from spikecam_env.checked import LARGEST_COUNT
 from spikecam_env.errors import InputError, shown
+from spikecam_env.numbers import LARGEST_COUNT
 from spikecam_env.untrusted import read_table
 
 UNKNOWN, RELATIVE = "unknown", "relative"

@@ -12,11 +12,11 @@ from spikecam_env.sensor.effects.base import build
 
 TARGET_SIZE = 60.0
 """Noises by which a weak linear effect is simulated, within `MOST_EXTRAPOLATED`, and scaled down.  Statistics are in
-proportion so far: `python -m benchmarks.in_proportion`."""
+proportion so far: benchmarks/in_proportion.py of version 0.1.0."""
 
 MOST_EXTRAPOLATED = 4.0
 """Largest factor by which a strength, and the unit under it, are extrapolated at once.  Statistics are in proportion
-so far: `python -m benchmarks.in_proportion`."""
+so far: benchmarks/in_proportion.py of version 0.1.0."""
 
 
 def with_effect(model: SensorModel, name: str, parameters: Mapping[str, float]) -> SensorModel:
