@@ -14,8 +14,8 @@ from collections import Counter
 from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
-from importlib import import_module
 from pathlib import Path
+from runpy import run_path
 from types import ModuleType
 from typing import Any
 
@@ -163,18 +163,17 @@ def read_program(module: str, words: Sequence[str]) -> None:
     source = file.read_text(encoding="utf-8")
     if "tyro.cli" not in source and "ArgumentParser" not in source:
         return  # it takes files and names as they come
-    program: Any = import_module(module)
     with MonkeyPatch.context() as patch, suppress(Understood):
         patch.setattr(sys, "argv", [module, *words])
         patch.setattr(tyro, "cli", _only_reading(tyro.cli))
         patch.setattr(argparse.ArgumentParser, "parse_args", _only_reading(argparse.ArgumentParser.parse_args))
-        tyro.cli(program.main) if "tyro.cli(main)" in source else program.main()
+        run_path(str(file), run_name="__main__")
         raise AssertionError(f"{module} did not read its command line")
 
 
 def _only_reading(parse: Callable[..., Any]) -> Callable[..., Any]:
     def reading(first: Any, *args: Any, **options: Any) -> Any:
-        if inspect.isfunction(first):
+        if callable(first) and not inspect.isclass(first):  # a program, which would begin its work
             first = functools.wraps(first)(lambda *_, **__: None)
         parse(first, *args, **options)
         raise Understood
