@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from scenes.disk import RotatingDisk
+from scenes.flat.disk import RotatingDisk
 from scenes.protocol import Gaze
 from scenes.textures import Texture
 from spikecam_env.compiled import njit

@@ -25,17 +25,17 @@ import torch
 
 import spikecam_env.envs  # noqa: F401 - registers
 from benchmarks import bench_cuda
-from denoiser import infer
-from denoiser.captured import captured
+from denoiser.ground.captured import captured
 from denoiser.many import ManyDnSS
+from denoiser.networks.stream_network import CARRY, StreamDnSS
 from denoiser.online import OnlineDnSS
-from denoiser.rollout import Rollouts
-from denoiser.simulated import Bank
-from denoiser.stream_network import CARRY, StreamDnSS
+from denoiser.passes import infer
+from denoiser.passes.window import RollingWindow
+from denoiser.training.rollout import Rollouts
+from denoiser.training.simulated import Bank
 from denoiser.weights import load_weights, pretrained_path
-from denoiser.window import RollingWindow
-from scenes.disk import RotatingDisk
-from scenes.planes_on_device import PlanePainter
+from scenes.flat.disk import RotatingDisk
+from scenes.flat.planes_on_device import PlanePainter
 from spikecam_env.bench.machine import FRAME_RATE_HZ, SHAPE, machine
 from spikecam_env.cli.files import write_json
 from spikecam_env.cli.table import table

@@ -18,12 +18,12 @@ from tqdm import tqdm
 from benchmarks.exact_disk import supersampled
 from benchmarks.renderers import EXACT_RAYS, bench_renderers
 from scenes.catalogue import SCENES, make_scene
-from scenes.collage import Collage
-from scenes.disk import RotatingDisk, disk_texture
-from scenes.flow import check_flow
+from scenes.derived.flow import check_flow
+from scenes.flat.collage import Collage
+from scenes.flat.disk import RotatingDisk, disk_texture
+from scenes.flat.sliding import SlidingTexture
 from scenes.keys import side_by_side
 from scenes.protocol import Scene
-from scenes.sliding import SlidingTexture
 from scenes.world import World
 from spikecam_env.bench.machine import FRAME_RATE_HZ, SHAPE
 from spikecam_env.cli.bench import print_figures
@@ -148,7 +148,7 @@ def bench_end_to_end(seconds: float = 2.0) -> Rows:
 
 
 def flow_table(names: Iterable[str]) -> Rows:
-    """`scenes.flow.check_flow` of scenes of the catalogue, in per cent."""
+    """`scenes.derived.flow.check_flow` of scenes of the catalogue, in per cent."""
     rows = []
     for name in tqdm(list(names), desc="flow", unit="scene", leave=False):
         check = check_flow(make_scene(name, SHAPE))

@@ -14,7 +14,7 @@ import torch
 from torch import Tensor
 from torch.utils.data import Dataset
 
-from denoiser.pairs import WARM_UP
+from denoiser.training.pairs import WARM_UP
 from spikecam_env.checked import checked_seed, checked_shape, checked_whole
 from spikecam_env.datasets import read_window
 from spikecam_env.datasets.manifest import Manifest

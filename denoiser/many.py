@@ -4,7 +4,7 @@
 
 Each stream has its own window, memory and length: one can begin anew while the others go on.  The rates are those of N
 `OnlineDnSS`, to the rounding of sums, which a batch may take in another order.  Where the denoiser has a device,
-everything is there (`denoiser.on_device`).
+everything is there (`denoiser.passes.on_device`).
 """
 
 from __future__ import annotations
@@ -16,10 +16,10 @@ import numpy as np
 import torch
 from numpy.typing import NDArray
 
-from denoiser import infer
-from denoiser.chain import PassChain, Rates
 from denoiser.online import OnlineDnSS
-from denoiser.window import PassWindow
+from denoiser.passes import infer
+from denoiser.passes.chain import PassChain, Rates
+from denoiser.passes.window import PassWindow
 from spikecam_env.checked import checked_count, checked_shape
 from spikecam_env.errors import InputError
 

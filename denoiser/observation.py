@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from denoiser.many import ManyDnSS
 from denoiser.online import OnlineDnSS
-from denoiser.recipe import RECIPES
+from denoiser.passes.recipe import RECIPES
 from spikecam_env.checked import checked_number
 from spikecam_env.envs.observations.protocol import Blocks, CameraView, Observation, grey, picture_space
 from spikecam_env.types import Masks

@@ -1,6 +1,6 @@
 """The denoiser as a stream: spikes in, in chunks of any length; denoised spikes out, a fixed latency later.
 
-    window (`denoiser.window`) -> network -> rate [spikes/frame] -> decoder (`denoiser.mus`, `denoiser.accumulate`)
+    window (`window.py`) -> network -> rate [spikes/frame] -> decoder (`mus.py`, `accumulate.py`)
 
 Frame t comes out once frame t + latency has gone in: 20 frames in `paper` mode, 31 in `best`, whose frames come
 sixteen at a time.  The output depends on the stream alone, bit for bit: not on how it is cut into chunks, nor on
@@ -20,15 +20,16 @@ import torch
 from numpy.typing import ArrayLike, NDArray
 from torch import nn
 
-from denoiser import accumulate, infer, mus
-from denoiser.chain import Crossfade, PassChain, Rates
-from denoiser.given_network import check_network, has_passes
-from denoiser.number_type import PRECISIONS, number_type
-from denoiser.on_device import DeviceChain, DeviceStreams, kept, spikes_on, unpacked_on
-from denoiser.pixel_map import PixelMap
-from denoiser.recipe import Recipe
+from denoiser.decoders import accumulate, mus
+from denoiser.ground.number_type import PRECISIONS, number_type
+from denoiser.passes import infer
+from denoiser.passes.chain import Crossfade, PassChain, Rates
+from denoiser.passes.given_network import check_network, has_passes
+from denoiser.passes.on_device import DeviceChain, DeviceStreams, kept, spikes_on, unpacked_on
+from denoiser.passes.pixel_map import PixelMap
+from denoiser.passes.recipe import Recipe
+from denoiser.passes.window import PassWindow, check_like
 from denoiser.weights import digest, load_weights, pretrained_path
-from denoiser.window import PassWindow, check_like
 from spikecam_env.calibration import Calibration
 from spikecam_env.checked import checked_count
 from spikecam_env.errors import InputError, NotReadyError, unknown_name
@@ -58,14 +59,14 @@ class OnlineDnSS:
             move).
         precision: of the network; "auto" is bfloat16 where the processor (the GPU, with `device`) has it, else float32.
         engine: "torch", or "captured", with a `device`: on CUDA a pass is then recorded once and replayed.
-        decoder: from rates to spikes, "accumulate" (`denoiser.accumulate`) or "mus" (`denoiser.mus`, the paper's);
+        decoder: from rates to spikes, "accumulate" (`accumulate.py`) or "mus" (`mus.py`, the paper's);
             default: the recipe's.
         unit: `best` mode only: the calibrated unit: maps (gain, dark) of shape (H, W), a `Calibration` of SNEE, the
             path of its maps.h5, or a `PixelMap`.
-        overlap: `best` mode only: two chains of passes, half a pass apart, and their mean (`denoiser.chain`): less
+        overlap: `best` mode only: two chains of passes, half a pass apart, and their mean (`chain.py`): less
             error, no seams, twice the work.
         device: `best` mode only: windows, planes and network as tensors there, "cuda", "cuda:1" or "cpu"
-            (`denoiser.on_device`).  In float32 rates differ by less than 1e-5 from those without.  Spikes, and the mean
+            (`on_device.py`).  In float32 rates differ by less than 1e-5 from those without.  Spikes, and the mean
             of `overlap`, are made of them on the host.  Default: windows on the processor, in compiled code.
 
     Raises:

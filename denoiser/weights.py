@@ -1,7 +1,7 @@
 """Checkpoints: trained networks as small files, with their recipe and the record of their training.
 
 A file is `torch.save` of plain values: format, mode, recipe, state_dict, training (command, seed, steps, minutes,
-package version) and sha256, the digest of recipe and weights.  A foreign file cannot run code (`denoiser.plain_torch`).
+package version) and sha256, the digest of recipe and weights.  A foreign file cannot run code (`plain_torch.py`).
 `seal` adds the digest to a file without one.
 """
 
@@ -20,9 +20,9 @@ from typing import Any, Protocol, TypeVar
 import torch
 from torch import Tensor, nn
 
-from denoiser.plain_torch import read_plain, tensors_like
-from denoiser.recipe import RECIPES, Recipe
-from denoiser.threads import where_torch_can
+from denoiser.ground.plain_torch import read_plain, tensors_like
+from denoiser.ground.torch_threads import where_torch_can
+from denoiser.passes.recipe import RECIPES, Recipe
 from spikecam_env.errors import InputError, shown, unknown_name
 from spikecam_env.whole import whole_file
 

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from denoiser.online import OnlineDnSS
-from denoiser.recipe import RECIPES
+from denoiser.passes.recipe import RECIPES
 from spikecam_env.envs.observations import block_shape
 from spikecam_env.errors import NotReadyError, unknown_name
 

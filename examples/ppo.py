@@ -12,7 +12,7 @@ import gymnasium
 import torch
 
 import spikecam_env  # noqa: F401  (registers the environments)
-from denoiser.run import Run
+from denoiser.training.resumable_run import Run
 from spikecam_env.agents import evaluate
 from spikecam_env.agents.agent import Agent
 from spikecam_env.agents.policy import PolicyRecipe

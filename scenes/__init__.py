@@ -1,11 +1,24 @@
 """Scenes before the camera: light over time, and the truth about it."""
 
-from scenes.collage import Collage
-from scenes.disk import RotatingDisk
+from scenes.film.video import VideoScene
+from scenes.flat.collage import Collage
+from scenes.flat.disk import RotatingDisk
+from scenes.flat.sliding import SlidingTexture
 from scenes.protocol import Gaze, Scene, Truth
-from scenes.sliding import SlidingTexture
 from scenes.textures import TEXTURES, random_texture
-from scenes.video import VideoScene
+from spikecam_env.renamed import old_modules
+
+old_modules(
+    "scenes",
+    {
+        "collage": "flat.collage",
+        "discs": "flat.discs",
+        "disk": "flat.disk",
+        "flow": "derived.flow",
+        "sliding": "flat.sliding",
+        "video": "film.video",
+    },
+)
 
 DISTRIBUTION = "spikecam-env"
 """By which `spikecam_env.siblings` knows this package from another of its name."""

@@ -34,7 +34,7 @@ def expose(scene: Scene, mean_interval: float = 10.0, metered: Scene | None = No
         InputError: the interval is below 1 (a pixel fires at most once a frame), or the scene has no light.
 
     Example:
-        >>> from scenes.disk import RotatingDisk
+        >>> from scenes.flat.disk import RotatingDisk
         >>> round(1.0 / float(expose(RotatingDisk((16, 24)), mean_interval=20.0).truth(0.5).radiance.mean()))
         20
     """
@@ -49,7 +49,7 @@ def lit(scene: Scene, gain: float) -> Scene:
     """The scene with `gain` times its light.
 
     Example:
-        >>> from scenes.disk import RotatingDisk
+        >>> from scenes.flat.disk import RotatingDisk
         >>> scene = RotatingDisk((16, 24))
         >>> round(float(lit(scene, 0.5).truth(0.5).radiance.mean() / scene.truth(0.5).radiance.mean()), 3)
         0.5
@@ -77,7 +77,7 @@ class Exposed(Derived):
     """Scene: another one with its light multiplied by `gain`.
 
     Example:
-        >>> from scenes.collage import Collage
+        >>> from scenes.flat.collage import Collage
         >>> scene = Collage((16, 24))
         >>> float(Exposed(scene, 0.5).truth(0.5).radiance.max() / scene.truth(0.5).radiance.max())
         0.5

@@ -1,5 +1,5 @@
-"""Meshes: shapes as parts, to be put together to surfaces (`scenes.assembly`); and your own mesh or picture
-(`scenes.mesh_files`).
+"""Meshes: shapes as parts, to be put together to surfaces (`scenes.surfaces.assembly`); and your own mesh or picture
+(`scenes.surfaces.mesh_files`).
 
     assemble(lathe(profile, picture), box((1, 1, 1), 0.2).moved(Still((0, 2, 0))))  # one rigid surface
     from_file("teapot.obj", texture="wood.jpg", size=1.0)  # your own
@@ -18,9 +18,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from scenes.assembly import Albedo, Part, Points, assemble, joined, unit_vectors
-from scenes.mesh_files import from_file, from_mesh, picture
-from scenes.transfer import linear_from_srgb as linear
+from scenes.film.transfer import linear_from_srgb as linear
+from scenes.surfaces.assembly import Albedo, Part, Points, assemble, joined, unit_vectors
+from scenes.surfaces.mesh_files import from_file, from_mesh, picture
 from spikecam_env.errors import InputError
 
 __all__ = [

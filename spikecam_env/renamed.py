@@ -1,9 +1,13 @@
-"""Old names of public classes: they work for one version, with a warning."""
+"""Old names of public classes, and old places of modules: they work for one version, with a warning."""
 
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
+from importlib import import_module
+from importlib.abc import Loader, MetaPathFinder
+from importlib.machinery import ModuleSpec
+from types import ModuleType
 from typing import Any
 from warnings import warn
 
@@ -23,3 +27,34 @@ def old_names(module: str, names: dict[str, str]) -> Callable[[str], Any]:
         return getattr(sys.modules[module], names[name])
 
     return attribute
+
+
+def old_modules(package: str, moved: Mapping[str, str]) -> None:
+    """Let modules of a package be imported from where they were.
+
+    Args:
+        package: its `__name__`.
+        moved: old name of a module below `package` -> its name below `package` now.
+    """
+    sys.meta_path.append(_Moved({f"{package}.{old}": f"{package}.{new}" for old, new in moved.items()}))
+
+
+class _Moved(MetaPathFinder, Loader):
+    def __init__(self, moved: Mapping[str, str]) -> None:
+        self.moved = moved
+        self.own: dict[str, ModuleSpec | None] = {}
+
+    def find_spec(
+        self, fullname: str, path: Sequence[str] | None = None, target: ModuleType | None = None
+    ) -> ModuleSpec | None:
+        return ModuleSpec(fullname, self) if fullname in self.moved else None
+
+    def create_module(self, spec: ModuleSpec) -> ModuleType:
+        warn(f"{spec.name} is now {self.moved[spec.name]}", DeprecationWarning, stacklevel=2)
+        module = import_module(self.moved[spec.name])
+        self.own[spec.name] = module.__spec__
+        return module
+
+    def exec_module(self, module: ModuleType) -> None:
+        """Give the module its own spec back: it has been executed where it is now."""
+        module.__spec__ = self.own.pop(module.__spec__.name if module.__spec__ else "", module.__spec__)

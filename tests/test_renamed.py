@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import sys
 from importlib import import_module
 from pathlib import Path
 
@@ -35,3 +36,14 @@ def test_an_old_name_is_the_new_class_with_a_warning(module: str, old: str, new:
 def test_another_name_is_an_attribute_error_as_of_any_module() -> None:
     with pytest.raises(AttributeError, match=r"module 'spikecam_env\.campaign' has no attribute 'Taken'"):
         _ = import_module("spikecam_env.campaign").Taken
+
+
+@pytest.mark.parametrize(
+    "old, new", [("denoiser.run", "denoiser.training.resumable_run"), ("scenes.discs", "scenes.flat.discs")]
+)
+def test_a_module_that_moved_is_found_where_it_was(old: str, new: str) -> None:
+    here = import_module(new)
+    sys.modules.pop(old, None)
+    with pytest.warns(DeprecationWarning, match=rf"{re.escape(old)} is now {re.escape(new)}"):
+        assert import_module(old) is here
+    assert here.__spec__ is not None and here.__spec__.name == new

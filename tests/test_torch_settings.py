@@ -5,15 +5,17 @@ from __future__ import annotations
 import pytest
 import torch
 
-from denoiser.reconstruct.train import ReconstructorConfig, train_reconstructor
-from denoiser.train import TrainConfig, train
+from denoiser.training.train_denoiser import TrainConfig, train
+from denoiser.training.train_reconstructor import ReconstructorConfig, train_reconstructor
 from spikecam_env.agents.ppo import PPO
 from spikecam_env.agents.training import Study, train_agent
 from spikecam_env.torch_settings import torch_settings
 
 LEARNERS = {
-    "denoiser.train:_trained": lambda out: train(TrainConfig(mode="best", out=out, threads=2, seed=7)),
-    "denoiser.reconstruct.train:_trained": lambda out: train_reconstructor(
+    "denoiser.training.train_denoiser:_trained": lambda out: train(
+        TrainConfig(mode="best", out=out, threads=2, seed=7)
+    ),
+    "denoiser.training.train_reconstructor:_trained": lambda out: train_reconstructor(
         ReconstructorConfig(mode="ssml", out=out, width=12, threads=2, seed=7)
     ),
 }

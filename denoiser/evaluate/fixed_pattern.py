@@ -27,8 +27,8 @@ from denoiser.evaluate.grain import GAP, Picture, elsewhere, kept, relative_grai
 from denoiser.evaluate.quick import held_out_textures
 from denoiser.evaluate.restored import restored
 from denoiser.online import OnlineDnSS
-from denoiser.pairs import light_in_frame
-from scenes.sliding import SlidingTexture
+from denoiser.training.pairs import light_in_frame
+from scenes.flat.sliding import SlidingTexture
 from spikecam_env.errors import InputError
 from spikecam_env.sensor import SensorModel, SpikeSensor
 

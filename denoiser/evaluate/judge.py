@@ -11,8 +11,8 @@ from pydantic import Field
 
 from denoiser.evaluate import measures
 from denoiser.evaluate.exposed import ExposedStreams, Planes, picture
-from denoiser.metrics import psnr_db, ssim
-from denoiser.niqe import SMALLEST, niqe
+from denoiser.evaluate.metrics import psnr_db, ssim
+from denoiser.evaluate.niqe import SMALLEST, niqe
 from spikecam_env.types import Spikes
 from spikecam_env.untrusted import Declared, Name, Seed
 

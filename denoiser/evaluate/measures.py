@@ -10,7 +10,7 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
-from denoiser.metrics import psnr_db
+from denoiser.evaluate.metrics import psnr_db
 
 Frames = NDArray[np.floating] | NDArray[np.uint8]
 

@@ -14,9 +14,9 @@ from pathlib import Path
 import numpy as np
 
 from denoiser.evaluate.exposed import ExposedStreams, StreamCase
-from denoiser.pairs import light_in_frame
+from denoiser.training.pairs import light_in_frame
 from scenes.catalogue import make_scene
-from scenes.faster import at_speed
+from scenes.derived.faster import at_speed
 from scenes.protocol import Scene
 from spikecam_env.datasets import PHM, phm_n
 from spikecam_env.datasets.manifest import Manifest

@@ -9,7 +9,7 @@ The method is for "well lit, moving" (the paper's sets are high-speed scenes in 
 listed apart.  In a still scene fixed pattern and texture look alike: only knowledge of pictures helps.
 
 Rows: noisy; two for each mode, its spikes and its rate planes; clean (the noise-free twin); oracle (the true light
-through `denoiser.accumulate`).  The oracle has the score of a perfect network: against the light it is the clean
+through `accumulate.py`).  The oracle has the score of a perfect network: against the light it is the clean
 stream's equal.  Against the clean twin's picture it bounds any stream of spikes, for two streams of one light differ by
 their quantisation (`metrics.count_variance`).  Rates are not quantised and may come half that (3 dB) nearer.
 """
@@ -27,12 +27,12 @@ import numpy as np
 from numpy.typing import NDArray
 from tqdm import tqdm
 
-from denoiser import accumulate
+from denoiser.decoders import accumulate
+from denoiser.evaluate.metrics import gap_closed, psnr_db, ssim
 from denoiser.evaluate.restored import Weights, denoisers, restored
 from denoiser.evaluate.writing import number, write_result
-from denoiser.metrics import gap_closed, psnr_db, ssim
-from denoiser.pairs import light_in_frame
-from scenes.collage import Collage
+from denoiser.training.pairs import light_in_frame
+from scenes.flat.collage import Collage
 from scenes.textures import Texture, random_texture
 from spikecam_env.sensor import Keyframes, SensorModel, SpikeSensor
 from spikecam_env.streams import middleTFI, middleTFP

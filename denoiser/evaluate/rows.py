@@ -5,7 +5,7 @@ one go, so that a network runs once for MUS and accumulation.
 
     noisy, clean       spikes as they are
     TFP, SSML, ...     the paper's pipelines: every frame reconstructed, then spikes by the noise-free camera, which is
-                       `denoiser.accumulate`
+                       `denoiser.decoders.accumulate`
     paper, best, ...   rate planes of an `OnlineDnSS`, from the stream's first frame on
     light              the true light through a decoder: the score of a perfect network
 """
@@ -22,11 +22,11 @@ from typing import Any
 
 import numpy as np
 
-from denoiser import accumulate, mus
-from denoiser.evaluate import held, still
+from denoiser.decoders import accumulate, held, mus
+from denoiser.evaluate import still
 from denoiser.evaluate.exposed import CLASSICAL, ExposedStreams, Planes, StreamCase, film
+from denoiser.ground.plain_torch import read_plain
 from denoiser.online import OnlineDnSS
-from denoiser.plain_torch import read_plain
 from denoiser.weights import load_weights
 from spikecam_env.errors import InputError
 from spikecam_env.types import Spikes

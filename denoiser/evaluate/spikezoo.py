@@ -26,8 +26,8 @@ import numpy as np
 from numpy.typing import NDArray
 from tqdm import tqdm
 
+from denoiser.evaluate.metrics import psnr_db, ssim
 from denoiser.evaluate.restored import Weights, denoisers, restored
-from denoiser.metrics import psnr_db, ssim
 from spikecam_env.checked import checked_number
 from spikecam_env.datasets.spikezoo import RATE, WHITES, find_clips, read_clip
 from spikecam_env.errors import InputError

@@ -14,8 +14,8 @@ import numpy as np
 from denoiser.evaluate.exposed import ExposedStreams, StreamCase
 from denoiser.evaluate.phm import AHEAD
 from denoiser.evaluate.quick import LIGHTS, held_out_textures
-from denoiser.pairs import light_in_frame
-from scenes.collage import Collage
+from denoiser.training.pairs import light_in_frame
+from scenes.flat.collage import Collage
 from spikecam_env.calibration import Calibration, calibrate, write_flats
 from spikecam_env.sensor import SensorModel, SpikeSensor
 

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from denoiser.evaluate.judge import RowResult, plain
-from denoiser.metrics import gap_closed
+from denoiser.evaluate.metrics import gap_closed
 
 Mean = dict[str, float | None]
 

@@ -5,7 +5,7 @@
 `OnlineDnSS` runs its network for every frame, or for every sixteen.  `LiveDnSS` keeps the last packed frames and does
 nothing else with them.  A picture is the newest pass of the network that these frames allow:
 
-    its window      unpacked, with its planes (`denoiser.window`)
+    its window      unpacked, with its planes (`denoiser.passes.window`)
     its past        last spikes and running means, from the pass before on.  Where that is more than HISTORY frames ago:
                     of the last HISTORY frames before the window, as if the stream had begun there.
     gain, carried   as the pass before left them, however long ago that is
@@ -23,13 +23,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from denoiser import infer
 from denoiser.live.past import Past
 from denoiser.live.ring import Ring
 from denoiser.online import OnlineDnSS
-from denoiser.pixel_map import PixelMap
+from denoiser.passes import infer
+from denoiser.passes.pixel_map import PixelMap
+from denoiser.passes.window import PassWindow, RollingWindow
 from denoiser.weights import load_weights
-from denoiser.window import PassWindow, RollingWindow
 from spikecam_env.checked import checked_count, checked_shape, checked_whole
 from spikecam_env.errors import InputError, NotReadyError
 

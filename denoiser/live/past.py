@@ -3,7 +3,7 @@
     last      (P,) the last spike before the window [frame]; -1: none is known
     means     (M, P) running means e <- e + (s - e) / m over all frames before the window, one for each memory m
 
-These are the numbers that `denoiser.window.RollingWindow` keeps of frames that have left its window, with the same
+These are the numbers that `RollingWindow` keeps of frames that have left its window, with the same
 operations in the same order, so the same bits.  Frames are read from a ring: frame f lies in row f % rows.
 """
 

@@ -22,11 +22,11 @@ import torch
 from numpy.typing import ArrayLike, NDArray
 from torch import nn
 
-from denoiser.number_type import PRECISIONS, computing_in, number_type
-from denoiser.reconstruct.recipe import LEARNED
-from denoiser.reconstruct.spk2imgnet import WINDOW
-from denoiser.reconstruct.weights import load_reconstructor, shipped_path
-from denoiser.threads import where_torch_can
+from denoiser.ground.number_type import PRECISIONS, computing_in, number_type
+from denoiser.ground.torch_threads import where_torch_can
+from denoiser.networks.reconstructor_recipe import LEARNED
+from denoiser.networks.spk2imgnet import WINDOW
+from denoiser.reconstructor_weights import load_reconstructor, shipped_path
 from spikecam_env.checked import checked_whole
 from spikecam_env.errors import InputError, unknown_name
 from spikecam_env.streams import middleTFI, middleTFP

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from scenes.collage import Collage
+from scenes.flat.collage import Collage
 from scenes.protocol import Scene
 from scenes.renderers.protocol import Renderer
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from scenes.disk import RotatingDisk
+from scenes.flat.disk import RotatingDisk
 from scenes.protocol import Scene
 from scenes.renderers.protocol import Renderer
 

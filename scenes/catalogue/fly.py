@@ -6,12 +6,12 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from scenes.assembly import Points
 from scenes.catalogue import stage
 from scenes.drawing import Canvas
 from scenes.meshes import Part, assemble, capsule, sheet, sphere
 from scenes.protocol import Scene
 from scenes.renderers.protocol import Renderer, Surface
+from scenes.surfaces.assembly import Points
 from scenes.textures import Texture, blobs
 from scenes.trajectories import Path, Still, Swinging, Vibrating
 from scenes.world import Body, World

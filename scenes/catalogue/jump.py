@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 
-from scenes.assembly import Part
 from scenes.catalogue import stage
 from scenes.drawing import Canvas
 from scenes.meshes import assemble, capsule, sheet, sphere
 from scenes.protocol import Scene
 from scenes.renderers.protocol import Renderer, Surface
+from scenes.surfaces.assembly import Part
 from scenes.textures import Texture
 from scenes.trajectories import Bouncing, Spinning, Still, Swinging
 from scenes.world import Body, World

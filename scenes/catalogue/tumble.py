@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from scenes.camera import Camera
-from scenes.disk import disk_texture
+from scenes.flat.disk import disk_texture
 from scenes.meshes import assemble, box, capsule, disc, rectangle, sphere, torus
 from scenes.protocol import Scene
 from scenes.renderers.protocol import Lighting, Renderer

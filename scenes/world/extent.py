@@ -8,8 +8,8 @@ import numpy as np
 import trimesh
 from numpy.typing import NDArray
 
-from scenes.layers import project
 from scenes.renderers.protocol import PictureWindow
+from scenes.world.layers import project
 from spikecam_env.types import Floats
 
 PROBES = 256

@@ -1,4 +1,4 @@
-"""Light at key frames: bodies rendered seldom (`scenes.layers`), carried to each frame by their motion, and laid over
+"""Light at key frames: bodies rendered seldom (`layers.py`), carried to each frame by their motion, and laid over
 each other from the back to the front."""
 
 from __future__ import annotations
@@ -11,10 +11,10 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from scenes.layers import BodyKey, Carried, carry, lay, render_key
 from scenes.protocol import Gaze
 from scenes.world.cache import WorldCache
 from scenes.world.extent import extent
+from scenes.world.layers import BodyKey, Carried, carry, lay, render_key
 from scenes.world.plan import BLOCK, BlockPlan, pace_of
 from scenes.world.sky import sky
 from scenes.world.spec import WorldSpec, gaze_offsets

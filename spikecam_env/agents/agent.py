@@ -7,7 +7,7 @@
     observation, reward, *_ = env.step(agent.act(observation))
 
 A file is `torch.save` of plain values: format, task, obs, recipe, float16 weights, and the record of its training.  A
-foreign file cannot run code (`denoiser.plain_torch`).
+foreign file cannot run code (`denoiser.ground.plain_torch`).
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ import numpy as np
 import torch
 from numpy.typing import NDArray
 
-from denoiser.plain_torch import read_plain, tensors_like
+from denoiser.ground.plain_torch import read_plain, tensors_like
 from denoiser.weights import write_whole
 from spikecam_env.agents.history import History
 from spikecam_env.agents.policy import Policy, PolicyRecipe

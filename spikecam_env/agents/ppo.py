@@ -32,7 +32,7 @@ from torch import Tensor
 from torch.distributions import Normal
 from tqdm import tqdm
 
-from denoiser.run import Run
+from denoiser.training.resumable_run import Run
 from spikecam_env.agents.history import History
 from spikecam_env.agents.policy import Policy
 from spikecam_env.envs.oracle import oracle

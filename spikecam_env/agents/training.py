@@ -1,6 +1,6 @@
 """From a task's name to a trained agent, as `spikecam train-agent`.
 
-OUT/last.pt     to go on from (`denoiser.run`)
+OUT/last.pt     to go on from (`denoiser.training.resumable_run`)
 OUT/agent.pt    the agent so far (`agents.agent`)
 OUT/curve.json  rows: steps, processor seconds, episodes, their mean return, performance and success
 OUT/along/      agents on the way, by their steps, where they are asked for
@@ -18,7 +18,7 @@ import gymnasium
 from gymnasium.spaces import Box, Dict
 from gymnasium.vector import VectorEnv
 
-from denoiser.run import Run
+from denoiser.training.resumable_run import Run
 from spikecam_env.agents.agent import ENDING, Agent
 from spikecam_env.agents.policy import PolicyRecipe
 from spikecam_env.agents.ppo import PPO, train

@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 from tqdm import tqdm
 
 import spikecam_env.envs  # noqa: F401
-from scenes.planes import painted_planes
+from scenes.flat.planes import painted_planes
 from spikecam_env.bench.learners import bench_learners
 from spikecam_env.envs.spike_camera import SpikeCameraEnv, lights_of
 from spikecam_env.sensor import Keyframes, step_together

@@ -18,9 +18,9 @@ import numpy as np
 from numpy.typing import NDArray
 from tqdm import tqdm
 
+from denoiser.evaluate.metrics import psnr_db
 from denoiser.live import LiveDnSS
 from denoiser.live.session import Figures, Session, Shown
-from denoiser.metrics import psnr_db
 from denoiser.online import OnlineDnSS
 from scenes import RotatingDisk, Scene
 from scenes.catalogue import make_scene

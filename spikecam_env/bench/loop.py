@@ -22,7 +22,7 @@ from tqdm import tqdm
 from denoiser.online import OnlineDnSS
 from denoiser.weights import load_weights, pretrained_path
 from scenes.catalogue import make_scene
-from scenes.disk import RotatingDisk
+from scenes.flat.disk import RotatingDisk
 from scenes.protocol import Scene
 from spikecam_env.bench.machine import FRAME_RATE_HZ, SHAPE
 from spikecam_env.sensor import SpikeSensor

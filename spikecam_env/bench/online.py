@@ -13,7 +13,7 @@ import torch
 from tqdm import tqdm
 
 from denoiser.online import OnlineDnSS
-from denoiser.recipe import recipe_of
+from denoiser.passes.recipe import recipe_of
 from scenes import RotatingDisk
 from spikecam_env.sensor import SpikeSensor
 from spikecam_env.torch_settings import torch_settings

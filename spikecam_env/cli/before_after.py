@@ -10,7 +10,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from denoiser.metrics import psnr_db
+from denoiser.evaluate.metrics import psnr_db
 from spikecam_env.cli.panels import PicturePanel
 from spikecam_env.streams import middleTFP
 from spikecam_env.types import Pictures, Spikes

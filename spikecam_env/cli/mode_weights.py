@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Literal
 
 Mode = Literal["best", "fast", "paper"]
-"""Of `denoiser.recipe.RECIPES`."""
+"""Of `denoiser.passes.recipe.RECIPES`."""
 
 
 @dataclass(frozen=True)

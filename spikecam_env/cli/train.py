@@ -93,9 +93,9 @@ class Train:
 
 def _train(mode: str, options: dict[str, Any]) -> Path:
     if mode in RECONSTRUCTORS:
-        from denoiser.reconstruct.train import ReconstructorConfig, train_reconstructor
+        from denoiser.training.train_reconstructor import ReconstructorConfig, train_reconstructor
 
         return train_reconstructor(ReconstructorConfig(**options))
-    from denoiser.train import TrainConfig, train
+    from denoiser.training.train_denoiser import TrainConfig, train
 
     return train(TrainConfig(**options))

@@ -20,7 +20,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from PIL import Image
 
-from scenes.pictures import read_picture
+from scenes.film.pictures import read_picture
 from spikecam_env.checked import checked_number
 from spikecam_env.errors import InputError
 from spikecam_env.names import file_name

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 import torch
 
-from scenes.planes_on_device import planes_on
+from scenes.flat.planes_on_device import planes_on
 from spikecam_env.envs.cameras_on_host import by_place
 from spikecam_env.envs.observations import Blocks, Observation
 from spikecam_env.envs.spike_camera import ForEach, SpikeCameraEnv, lights_of

@@ -8,7 +8,7 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import ArrayLike
 
-from scenes.disk import RotatingDisk
+from scenes.flat.disk import RotatingDisk
 from spikecam_env.checked import checked_count, checked_number
 from spikecam_env.envs.aiming import SUCCESS_SHARE, AimingEnv
 from spikecam_env.envs.episode import Episode

@@ -9,8 +9,8 @@ from typing import Any, ClassVar
 import numpy as np
 
 from scenes.catalogue import SCENES, exposed, unexposed_scene
+from scenes.derived.later import Later
 from scenes.exposure import checked_interval
-from scenes.later import Later
 from scenes.protocol import Placed
 from scenes.renderers.choose import chosen
 from scenes.world import World

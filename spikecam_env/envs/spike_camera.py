@@ -14,8 +14,8 @@ from gymnasium import spaces
 from numpy.typing import ArrayLike, NDArray
 
 from scenes.exposure import lit
-from scenes.painted_disk import Plane
-from scenes.planes import PlanarScene, painted_planes
+from scenes.flat.painted_disk import Plane
+from scenes.flat.planes import PlanarScene, painted_planes
 from scenes.protocol import MOST_LIGHT, Gaze, Scene
 from scenes.renderers.shared import register_user, release_user
 from spikecam_env.checked import checked_memory, checked_number, checked_seed, checked_shape, checked_switch

@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 import torch
 
-from denoiser.run import Run
+from denoiser.training.resumable_run import Run
 from spikecam_env.agents import ppo
 from spikecam_env.agents import study as studies
 from spikecam_env.agents.agent import Agent, shipped

@@ -10,7 +10,7 @@ import pytest
 from PIL import Image
 
 from denoiser import denoise
-from denoiser.metrics import psnr_db
+from denoiser.evaluate.metrics import psnr_db
 from spikecam_env.cli.panels import MARGIN, panel_scale
 from spikecam_env.streams import SpikeWriter, middleTFP, read_recording, read_truth, save_npz, save_vidar_dat
 from tests.commands import film_in, picture_in, spikecam

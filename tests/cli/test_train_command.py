@@ -7,10 +7,10 @@ from typing import get_args, get_type_hints
 
 import pytest
 
-from denoiser.recipe import RECIPES
-from denoiser.reconstruct.recipe import LEARNED
-from denoiser.reconstruct.train import ReconstructorConfig
-from denoiser.train import TrainConfig
+from denoiser.networks.reconstructor_recipe import LEARNED
+from denoiser.passes.recipe import RECIPES
+from denoiser.training.train_denoiser import TrainConfig
+from denoiser.training.train_reconstructor import ReconstructorConfig
 from spikecam_env.cli.main import run
 from spikecam_env.cli.train import ONLY_OF, RECONSTRUCTORS, Train
 
@@ -19,7 +19,10 @@ from spikecam_env.cli.train import ONLY_OF, RECONSTRUCTORS, Train
 def trained(monkeypatch):
     """The configurations that training was begun with."""
     begun = []
-    for module, name in (("denoiser.train", "train"), ("denoiser.reconstruct.train", "train_reconstructor")):
+    for module, name in (
+        ("denoiser.training.train_denoiser", "train"),
+        ("denoiser.training.train_reconstructor", "train_reconstructor"),
+    ):
         monkeypatch.setattr(f"{module}.{name}", lambda config, **_: begun.append(config) or Path("weights.pt"))
     return begun
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 import torch
 
-from denoiser.simulated import Bank
+from denoiser.training.simulated import Bank
 
 
 @pytest.fixture(scope="session")

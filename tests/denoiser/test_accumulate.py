@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from denoiser import accumulate
+from denoiser.decoders import accumulate
 
 SHAPE = (6, 8)
 

@@ -13,7 +13,7 @@ import pytest
 from torch.utils.data import DataLoader
 
 from denoiser.dataset import SpikeWindows
-from denoiser.pairs import WARM_UP
+from denoiser.training.pairs import WARM_UP
 from spikecam_env.datasets import Plan, PlannedScene, build
 from spikecam_env.errors import InputError
 from spikecam_env.streams import isi_plane, read_recording

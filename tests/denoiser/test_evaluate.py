@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from denoiser.evaluate import HELD_OUT_KINDS, PICTURES, evaluate_quick, held_out_textures, report
-from denoiser.pairs import TRAINING_KINDS
+from denoiser.training.pairs import TRAINING_KINDS
 
 
 def test_no_held_out_texture_kind_is_trained_on():

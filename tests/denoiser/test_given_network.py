@@ -11,8 +11,8 @@ from torch import nn
 
 from denoiser import DenoiseObservation, OnlineDnSS, denoise
 from denoiser.live import LiveDnSS
-from denoiser.recipe import RECIPES
-from denoiser.train import TrainConfig, started, train
+from denoiser.passes.recipe import RECIPES
+from denoiser.training.train_denoiser import TrainConfig, started, train
 from denoiser.weights import load_weights
 from spikecam_env.envs.rotating_disk import RotatingDiskEnv
 from spikecam_env.errors import InputError, OwnCodeError

@@ -8,8 +8,8 @@ import pytest
 import torch
 
 from benchmarks import bench_cuda, gpu
-from denoiser.captured import WARM_UPS
-from scenes.disk import RotatingDisk
+from denoiser.ground.captured import WARM_UPS
+from scenes.flat.disk import RotatingDisk
 from spikecam_env.sensor import SpikeSensorBatch
 
 CPU = torch.device("cpu")

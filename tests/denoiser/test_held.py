@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from denoiser import mus
-from denoiser.evaluate import held
+from denoiser.decoders import held, mus
 
 SHAPE = (16, 16)
 

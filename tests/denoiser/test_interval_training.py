@@ -7,12 +7,12 @@ import pytest
 import torch
 from torch import nn
 
-from denoiser import interval_training
-from denoiser.interval_training import LOOK_AHEAD, IntervalWindows, inverse_interval
-from denoiser.network import DnSS
-from denoiser.pairs import WARM_UP
-from denoiser.recipe import RECIPES
-from denoiser.simulated import StreamBlock
+from denoiser.networks.dnss import DnSS
+from denoiser.passes.recipe import RECIPES
+from denoiser.training import interval_training
+from denoiser.training.interval_training import LOOK_AHEAD, IntervalWindows, inverse_interval
+from denoiser.training.pairs import WARM_UP
+from denoiser.training.simulated import StreamBlock
 from spikecam_env.streams import isi_planes
 
 LAYOUT = RECIPES["paper"].layout

@@ -11,8 +11,8 @@ import pytest
 from denoiser.live import LiveDnSS
 from denoiser.live.past import Past
 from denoiser.online import OnlineDnSS
-from denoiser.recipe import RECIPES, recipe_of
-from denoiser.window import RollingWindow
+from denoiser.passes.recipe import RECIPES, recipe_of
+from denoiser.passes.window import RollingWindow
 from spikecam_env.errors import InputError, NotReadyError
 from spikecam_env.streams.packing import pack_frames
 

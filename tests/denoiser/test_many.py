@@ -7,7 +7,7 @@ import pytest
 
 from denoiser.many import ManyDnSS
 from denoiser.online import OnlineDnSS
-from denoiser.recipe import RECIPES
+from denoiser.passes.recipe import RECIPES
 from spikecam_env.errors import InputError
 
 SHAPE = (10, 12)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from denoiser import accumulate
+from denoiser.decoders import accumulate
 from denoiser.evaluate import measures
 
 SHAPE = (24, 32)

@@ -8,9 +8,9 @@ import sys
 import numpy as np
 import pytest
 
-from denoiser import accumulate
-from denoiser.metrics import count_variance, gap_closed, psnr_db, ssim
-from denoiser.niqe import niqe
+from denoiser.decoders import accumulate
+from denoiser.evaluate.metrics import count_variance, gap_closed, psnr_db, ssim
+from denoiser.evaluate.niqe import niqe
 from spikecam_env.errors import InputError
 
 

@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from denoiser import mus
+from denoiser.decoders import mus
 
 
 def literal(planes: np.ndarray, first_wait: float) -> np.ndarray:

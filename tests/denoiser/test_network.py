@@ -6,8 +6,8 @@ import pytest
 import torch
 from torch.utils.flop_counter import FlopCounterMode
 
-from denoiser.network import DnSS
-from denoiser.recipe import RECIPES
+from denoiser.networks.dnss import DnSS
+from denoiser.passes.recipe import RECIPES
 
 
 def parameters(network: torch.nn.Module) -> int:

@@ -1,6 +1,6 @@
 """A denoiser whose windows and network are tensors on a device against today's; on the processor, and on a GPU if any.
 
-On a processor the same code runs as on a GPU, but for the recording of a pass (`denoiser.captured`).
+On a processor the same code runs as on a GPU, but for the recording of a pass (`denoiser.ground.captured`).
 """
 
 from __future__ import annotations
@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 import torch
 
-from denoiser.captured import WARM_UPS
+from denoiser.ground.captured import WARM_UPS
 from denoiser.many import ManyDnSS
 from denoiser.online import OnlineDnSS
 from spikecam_env.errors import InputError, NotReadyError
@@ -61,7 +61,7 @@ def test_what_a_recording_runs_is_forgotten(monkeypatch: pytest.MonkeyPatch) -> 
             step()
         return lambda: step().clone()
 
-    monkeypatch.setattr("denoiser.on_device.captured", recorded)
+    monkeypatch.setattr("denoiser.passes.on_device.captured", recorded)
     spikes = stream(101)
     np.testing.assert_array_equal(rates(online(engine="captured"), spikes, 13), rates(online(), spikes, 13))
 

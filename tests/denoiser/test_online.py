@@ -9,12 +9,12 @@ import numpy as np
 import pytest
 import torch
 
-from denoiser import infer
-from denoiser.chain import PassChain
-from denoiser.number_type import number_type
+from denoiser.ground.number_type import number_type
 from denoiser.online import OnlineDnSS, denoise
-from denoiser.recipe import RECIPES
-from denoiser.window import RollingWindow
+from denoiser.passes import infer
+from denoiser.passes.chain import PassChain
+from denoiser.passes.recipe import RECIPES
+from denoiser.passes.window import RollingWindow
 from spikecam_env.errors import InputError, NotReadyError
 from spikecam_env.streams import isi_planes
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from denoiser.pairs import draw_model, light_in_frame
+from denoiser.training.pairs import draw_model, light_in_frame
 from spikecam_env.sensor import Keyframes
 
 

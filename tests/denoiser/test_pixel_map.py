@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from denoiser.online import OnlineDnSS
-from denoiser.pixel_map import PixelMap
+from denoiser.passes.pixel_map import PixelMap
 from spikecam_env.calibration import calibrate, save_calibration, write_flats
 from spikecam_env.errors import InputError
 from spikecam_env.sensor import SensorModel, SpikeSensor

@@ -15,8 +15,8 @@ import torch
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from denoiser.plain_torch import read_plain
-from denoiser.recipe import RECIPES, Recipe
+from denoiser.ground.plain_torch import read_plain
+from denoiser.passes.recipe import RECIPES, Recipe
 from denoiser.weights import digest, load_weights, pretrained_path, save_weights, seal
 from spikecam_env.errors import InputError
 

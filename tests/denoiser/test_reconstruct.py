@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 import torch
 
+from denoiser.networks.reconstructor_recipe import LEARNED, WIDTH_STEP, ReconstructorRecipe, reconstructor_recipe
 from denoiser.reconstruct import RECONSTRUCTORS, reconstruct, reconstruct_many
 from denoiser.reconstruct.pictures import PLAIN, light, window_about
-from denoiser.reconstruct.recipe import LEARNED, WIDTH_STEP, ReconstructorRecipe, reconstructor_recipe
-from denoiser.reconstruct.weights import load_reconstructor, save_reconstructor
+from denoiser.reconstructor_weights import load_reconstructor, save_reconstructor
 from spikecam_env.errors import InputError
 from spikecam_env.streams import middleTFI, middleTFP
 

@@ -8,16 +8,16 @@ import numpy as np
 import pytest
 import torch
 
-from denoiser import training_loop
-from denoiser.reconstruct import lessons, spk2imgnet, ssml
-from denoiser.reconstruct import train as training
-from denoiser.reconstruct.lessons import LessonWindows, lesson_of
-from denoiser.reconstruct.recipe import LEARNED, WIDTH_STEP, reconstructor_recipe
-from denoiser.reconstruct.rolling import RollingWindows
-from denoiser.reconstruct.train import ReconstructorConfig, train_reconstructor
-from denoiser.reconstruct.weights import load_reconstructor
-from denoiser.run import Run
-from denoiser.simulated import TWINS, Bank, StreamBlock
+from denoiser.networks import spk2imgnet, ssml
+from denoiser.networks.reconstructor_recipe import LEARNED, WIDTH_STEP, reconstructor_recipe
+from denoiser.reconstructor_weights import load_reconstructor
+from denoiser.training import lessons, training_loop
+from denoiser.training import train_reconstructor as training
+from denoiser.training.lessons import LessonWindows, lesson_of
+from denoiser.training.resumable_run import Run
+from denoiser.training.rolling import RollingWindows
+from denoiser.training.simulated import TWINS, Bank, StreamBlock
+from denoiser.training.train_reconstructor import ReconstructorConfig, train_reconstructor
 from spikecam_env.errors import InputError
 from spikecam_env.streams import isi_plane
 

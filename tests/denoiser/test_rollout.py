@@ -6,11 +6,11 @@ import pytest
 import torch
 from torch import nn
 
-from denoiser import rollout
-from denoiser.recipe import RECIPES
-from denoiser.rollout import Rollouts
-from denoiser.simulated import StreamBlock
-from denoiser.stream_network import CARRY
+from denoiser.networks.stream_network import CARRY
+from denoiser.passes.recipe import RECIPES
+from denoiser.training import rollout
+from denoiser.training.rollout import Rollouts
+from denoiser.training.simulated import StreamBlock
 
 LAYOUT = RECIPES["best"].layout
 CPU = torch.device("cpu")

@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 import torch
 
-from denoiser import infer
-from denoiser.pixel_map import PixelMap
-from denoiser.recipe import RECIPES
-from denoiser.side_by_side import side_by_side
-from denoiser.window import RollingWindow
+from denoiser.passes import infer
+from denoiser.passes.pixel_map import PixelMap
+from denoiser.passes.recipe import RECIPES
+from denoiser.passes.side_by_side import side_by_side
+from denoiser.passes.window import RollingWindow
 from spikecam_env.threads import as_many_as_pay
 
 BEST = RECIPES["best"]

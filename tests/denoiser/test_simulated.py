@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 import torch
 
-from denoiser.recipe import RECIPES
-from denoiser.simulated import AGES, SHAPES, SPEEDS, TWINS, Bank, SimulatedStreams
+from denoiser.passes.recipe import RECIPES
+from denoiser.training.simulated import AGES, SHAPES, SPEEDS, TWINS, Bank, SimulatedStreams
 from scenes.catalogue import make_scene
 from spikecam_env.errors import InputError
 from spikecam_env.sensor.kernels import fast

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import torch
 
-from denoiser import smaller
-from denoiser.network import DnSS
-from denoiser.recipe import RECIPES
-from denoiser.smaller import narrowed, without_refine
-from denoiser.stream_network import StreamDnSS
+from denoiser.networks.dnss import DnSS
+from denoiser.networks.stream_network import StreamDnSS
+from denoiser.passes.recipe import RECIPES
+from denoiser.training import smaller
+from denoiser.training.smaller import narrowed, without_refine
 
 SMALL, WIDE = (4, 8, 3), (8, 16, 6)
 LAYOUT = RECIPES["best"].layout

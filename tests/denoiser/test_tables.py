@@ -17,7 +17,7 @@ from denoiser.evaluate.rows import ROWS, Weights, why_not
 from denoiser.evaluate.table_report import report
 from denoiser.evaluate.table_summary import mean_and_spread
 from denoiser.evaluate.tables import TABLES, TableRequest, evaluate_table
-from denoiser.pixel_map import PixelMap
+from denoiser.passes.pixel_map import PixelMap
 from spikecam_env.datasets import build, phm_n
 from spikecam_env.errors import InputError
 from spikecam_env.sensor import SensorModel, SpikeSensor

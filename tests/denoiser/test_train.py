@@ -9,15 +9,15 @@ import numpy as np
 import pytest
 import torch
 
-from denoiser import train as training
-from denoiser import training_loop
 from denoiser.online import OnlineDnSS
-from denoiser.recipe import RECIPES
-from denoiser.reconstruct.train import ReconstructorConfig
-from denoiser.run import Run
-from denoiser.simulated import Bank
-from denoiser.train import TrainConfig, Validator, train
-from denoiser.training_record import command
+from denoiser.passes.recipe import RECIPES
+from denoiser.training import train_denoiser as training
+from denoiser.training import training_loop
+from denoiser.training.resumable_run import Run
+from denoiser.training.simulated import Bank
+from denoiser.training.train_denoiser import TrainConfig, Validator, train
+from denoiser.training.train_reconstructor import ReconstructorConfig
+from denoiser.training.training_record import command
 from denoiser.weights import load_weights, pretrained_path
 from spikecam_env.errors import InputError
 

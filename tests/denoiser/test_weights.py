@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 import torch
 
+from denoiser.networks.reconstructor_recipe import LEARNED
 from denoiser.online import OnlineDnSS
-from denoiser.recipe import RECIPES
-from denoiser.reconstruct.recipe import LEARNED
+from denoiser.passes.recipe import RECIPES
 from denoiser.weights import load_weights, pretrained_path, save_weights
 from spikecam_env.errors import InputError
 

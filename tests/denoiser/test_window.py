@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from denoiser.pixel_map import PixelMap
-from denoiser.window import RollingWindow, WindowLayout
+from denoiser.passes.pixel_map import PixelMap
+from denoiser.passes.window import RollingWindow, WindowLayout
 from spikecam_env.streams import isi_planes
 
 SHAPE = (5, 7)

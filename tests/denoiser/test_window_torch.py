@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 import torch
 
-from denoiser.pixel_map import PixelMap
-from denoiser.recipe import RECIPES
-from denoiser.window import RollingWindow, WindowLayout
-from denoiser.window_torch import StreamWindows, learned, pushed
+from denoiser.passes.pixel_map import PixelMap
+from denoiser.passes.recipe import RECIPES
+from denoiser.passes.window import RollingWindow, WindowLayout
+from denoiser.passes.window_torch import StreamWindows, learned, pushed
 from spikecam_env.errors import InputError
 
 LAYOUT = RECIPES["best"].layout

@@ -11,7 +11,7 @@ import pytest
 import torch
 
 from denoiser.online import OnlineDnSS
-from denoiser.recipe import RECIPES
+from denoiser.passes.recipe import RECIPES
 from denoiser.weights import save_weights
 from denoiser.wrapper import DenoiseObservation
 from spikecam_env.errors import InputError, NotReadyError

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from scenes.collage import Collage
-from scenes.disk import RotatingDisk
+from scenes.flat.collage import Collage
+from scenes.flat.disk import RotatingDisk
 from scenes.world import World
 
 DISK = "spikecam_env/RotatingDisk-v0"

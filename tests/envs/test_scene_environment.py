@@ -10,7 +10,7 @@ import pytest
 from gymnasium.utils.env_checker import check_env, data_equivalence
 
 from scenes.catalogue import SCENES
-from scenes.collage import Collage
+from scenes.flat.collage import Collage
 from scenes.world import World
 from spikecam_env.envs.observations import OBSERVATIONS
 from spikecam_env.envs.registration import ENVIRONMENTS, register

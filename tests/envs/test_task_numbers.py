@@ -16,7 +16,7 @@ import numpy as np
 import pytest
 
 from scenes.catalogue import unexposed_scene
-from scenes.discs import PiecewisePath
+from scenes.flat.discs import PiecewisePath
 from spikecam_env.envs import aiming, passes, scene, task
 from spikecam_env.envs.course import Drive, StepOutcome, steps_of
 from spikecam_env.envs.episode import Episode

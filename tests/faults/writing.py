@@ -70,7 +70,7 @@ def _bank(*_: object, **__: object) -> object:
     """A texture and an ideal unit: nothing is drawn."""
     import torch
 
-    from denoiser.simulated import TEXTURE_SIZE, UNIT_SHAPE, Bank
+    from denoiser.training.simulated import TEXTURE_SIZE, UNIT_SHAPE, Bank
     from spikecam_env.sensor.light import GRAINS
 
     nothing = torch.zeros(1, *UNIT_SHAPE)
@@ -107,7 +107,10 @@ DEMO: Work = {
     "spikecam_env.cli.showcase:last_picture": lambda _: _film()[0],
     "spikecam_env.cli.showcase:comparison": lambda _: [{"stream": "noisy"}],
 }
-TRAINING: Work = {"denoiser.simulated:Bank.drawn": _bank, "denoiser.reconstruct.train:_held_out": lambda _: []}
+TRAINING: Work = {
+    "denoiser.training.simulated:Bank.drawn": _bank,
+    "denoiser.training.train_reconstructor:_held_out": lambda _: [],
+}
 EVALUATION: Work = {
     "denoiser.evaluate:evaluate_quick": _evaluation,
     "denoiser.evaluate:report": lambda _: "figures\n" * 200,

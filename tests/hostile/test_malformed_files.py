@@ -16,8 +16,8 @@ from mutations import damaged, json_files, npz, npz_files, toml_files
 from tally import each, reads_or_refuses
 
 from denoiser.evaluate.work import FORMAT, Results
-from denoiser.reconstruct.recipe import WIDTH_STEP, reconstructor_recipe
-from denoiser.reconstruct.weights import load_reconstructor, save_reconstructor
+from denoiser.networks.reconstructor_recipe import WIDTH_STEP, reconstructor_recipe
+from denoiser.reconstructor_weights import load_reconstructor, save_reconstructor
 from denoiser.weights import load_weights, pretrained_path
 from spikecam_env.calibration import write_flats
 from spikecam_env.campaign import read_campaign

@@ -12,8 +12,8 @@ from tally import each
 
 from scenes import RotatingDisk
 from scenes.catalogue import make_scene
+from scenes.flat.sliding import SlidingTexture
 from scenes.protocol import Gaze
-from scenes.sliding import SlidingTexture
 from spikecam_env.cli.main import COMMANDS
 from spikecam_env.errors import InputError
 

@@ -13,10 +13,10 @@ import numpy as np
 import trimesh
 from PIL import Image
 
-from scenes.mesh_files import from_file
+from scenes.film.transfer import linear_from_srgb
 from scenes.renderers.protocol import Surface
 from scenes.renderers.view import geometry
-from scenes.transfer import linear_from_srgb
+from scenes.surfaces.mesh_files import from_file
 
 COMPONENTS = {"int8": 5120, "uint8": 5121, "int16": 5122, "uint16": 5123, "uint32": 5125, "float32": 5126}
 KINDS = {1: "SCALAR", 2: "VEC2", 3: "VEC3", 4: "VEC4", 16: "MAT4"}

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from scenes.catalogue import SCENES, make_scene, random_world
-from scenes.flow import check_flow
+from scenes.derived.flow import check_flow
 from scenes.protocol import Scene
 from scenes.renderers.embree import Embree
 from spikecam_env.errors import InputError

@@ -6,7 +6,7 @@ import cv2
 import numpy as np
 import pytest
 
-from scenes.collage import LONGEST_KEY, MOTION_PER_KEY, Collage
+from scenes.flat.collage import LONGEST_KEY, MOTION_PER_KEY, Collage
 from scenes.protocol import Gaze
 from spikecam_env.errors import InputError
 

@@ -6,7 +6,7 @@ import pytest
 
 from benchmarks.exact_disk import supersampled
 from scenes import Gaze, RotatingDisk
-from scenes.disk import disk_texture
+from scenes.flat.disk import disk_texture
 from spikecam_env.errors import InputError
 
 BACKGROUND = 0.2

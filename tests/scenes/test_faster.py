@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from scenes import RotatingDisk
-from scenes.faster import Faster, at_speed, speed_of
+from scenes.derived.faster import Faster, at_speed, speed_of
 from scenes.protocol import Gaze, Scene
 from spikecam_env.errors import InputError
 from spikecam_env.sensor import SensorModel, SpikeSensor

@@ -29,9 +29,9 @@ from gltf_files import (
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from scenes.mesh_files import from_file
+from scenes.film.transfer import linear_from_srgb
 from scenes.renderers.protocol import Surface
-from scenes.transfer import linear_from_srgb
+from scenes.surfaces.mesh_files import from_file
 from spikecam_env.errors import InputError
 
 HALF_TURN = [0.0, 0.0, 1.0, 0.0]

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from scenes import Collage, Gaze, RotatingDisk, SlidingTexture
+from scenes.derived.later import Later
 from scenes.keys import side_by_side
-from scenes.later import Later
 from spikecam_env.errors import InputError
 
 SHAPE = (40, 60)

@@ -16,10 +16,10 @@ from PIL import Image
 from trimesh.visual import ColorVisuals, TextureVisuals
 from trimesh.visual.material import PBRMaterial
 
-from scenes.mesh_files import from_file, from_mesh, picture
+from scenes.film.transfer import grey, linear_from_srgb
 from scenes.renderers.protocol import Surface
 from scenes.renderers.view import geometry
-from scenes.transfer import grey, linear_from_srgb
+from scenes.surfaces.mesh_files import from_file, from_mesh, picture
 from scenes.world import World
 from spikecam_env.errors import InputError
 

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from gltf_files import GREYS, LIGHT, encoded, read, seen, warning_of
 
-from scenes.mesh_files import from_file
+from scenes.surfaces.mesh_files import from_file
 from spikecam_env.errors import InputError
 
 SQUARE = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nvt 0 0\nvt 1 0\nvt 1 1\nvt 0 1\n"

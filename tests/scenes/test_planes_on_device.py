@@ -6,13 +6,13 @@ import numpy as np
 import pytest
 import torch
 
-from scenes.discs import Disc, Discs, PiecewisePath
-from scenes.disk import RotatingDisk
-from scenes.painted_disk import Texels, prefiltered
-from scenes.planes import painted_planes
-from scenes.planes_on_device import planes_on
+from scenes.flat.discs import Disc, Discs, PiecewisePath
+from scenes.flat.disk import RotatingDisk
+from scenes.flat.painted_disk import Texels, prefiltered
+from scenes.flat.planes import painted_planes
+from scenes.flat.planes_on_device import planes_on
+from scenes.flat.sliding import SlidingTexture
 from scenes.protocol import Gaze
-from scenes.sliding import SlidingTexture
 from spikecam_env.errors import InputError
 
 DEVICE = "cuda" if torch.cuda.is_available() else "cpu"

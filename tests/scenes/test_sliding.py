@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from scenes import Gaze, Scene, SlidingTexture
-from scenes.flow import check_flow
+from scenes.derived.flow import check_flow
 from scenes.textures import glyphs
 from spikecam_env.errors import InputError
 

@@ -10,9 +10,8 @@ import numpy as np
 import pytest
 
 from scenes.camera import Camera
+from scenes.derived.flow import check_flow
 from scenes.exposure import METERED_FRAMES, expose
-from scenes.flow import check_flow
-from scenes.layers import carry, project, render_key
 from scenes.meshes import assemble, box, disc, rectangle, sphere, torus
 from scenes.protocol import Gaze
 from scenes.renderers.embree import Embree
@@ -20,6 +19,7 @@ from scenes.renderers.protocol import Lighting, PictureWindow, Pinhole
 from scenes.textures import blobs, dead_leaves
 from scenes.trajectories import AT_REST, Ballistic, Path, Shake, Spinning, Still, Trajectory, Vibrating
 from scenes.world import Body, World
+from scenes.world.layers import carry, project, render_key
 from scenes.world.plan import BLOCK, pace_of
 from spikecam_env.errors import InputError
 

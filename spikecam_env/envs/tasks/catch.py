@@ -11,7 +11,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from scenes.discs import Discs, PiecewisePath
+from scenes.flat.discs import Discs, PiecewisePath
 from scenes.protocol import Gaze
 from spikecam_env.envs.episode import Episode, Standing
 from spikecam_env.envs.tasks.base import CameraUnits, Task

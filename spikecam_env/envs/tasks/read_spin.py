@@ -7,7 +7,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from scenes.discs import Discs
+from scenes.flat.discs import Discs
 from spikecam_env.envs.episode import Episode, Standing
 from spikecam_env.envs.task import OUTCOME, PROGRESS
 from spikecam_env.envs.tasks.base import CameraUnits, Task

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from scenes.discs import Disc, Discs
+from scenes.flat.discs import Disc, Discs
 from spikecam_env.envs.episode import Episode, Reaching
 from spikecam_env.envs.tasks.base import CameraUnits, Task
 from spikecam_env.envs.tasks.things import background, disc_of, number_of, wander

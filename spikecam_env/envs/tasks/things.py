@@ -12,9 +12,9 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from scenes.discs import Disc, PiecewisePath
 from scenes.drawing import Canvas
-from scenes.painted_disk import Texels, prefiltered
+from scenes.flat.discs import Disc, PiecewisePath
+from scenes.flat.painted_disk import Texels, prefiltered
 from scenes.textures import Texture, blobs, fractal_noise
 from spikecam_env.envs.tasks.base import CameraUnits
 from spikecam_env.envs.tasks.digits import DIGITS, digit

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import trimesh
 
+from scenes.film.transfer import grey, linear_from_srgb
 from scenes.meshes import from_mesh
 from scenes.renderers.protocol import Lighting, PictureWindow, Pinhole, Renderer, Surface
-from scenes.transfer import grey, linear_from_srgb
 
 WINDOW = PictureWindow(0, 0, 40, 60)
 EYE = np.eye(4)

@@ -1,0 +1,1 @@
+"""Decoders: from rates or intervals to spikes."""

@@ -1,0 +1,114 @@
+"""The modes: the window and network of each, its target in training, and its decoder from rates to spikes."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass
+from typing import Annotated, Any, Literal
+
+from pydantic import AfterValidator, Field
+from torch import nn
+
+from denoiser.networks.dnss import DnSS
+from denoiser.networks.stream_network import CARRY, CHANNELS, MOST_CHANNELS, StreamDnSS
+from denoiser.passes.window import WindowLayout
+from spikecam_env.checked import checked_whole
+from spikecam_env.errors import InputError, shown, unknown_name
+from spikecam_env.untrusted import Declared, declared
+
+
+@dataclass(frozen=True)
+class Recipe:
+    """Network, window, target and decoder of a mode."""
+
+    layout: WindowLayout
+    target: str
+    """The quantity that the network learns, "light" or "clean_inverse_interval"."""
+    decoder: str
+    """"mus" (`denoiser.decoders.mus`) or "accumulate" (`denoiser.decoders.accumulate`)."""
+    refine: bool = True
+    """Whether `paper` has its refine module."""
+    channels: tuple[int, int, int] = CHANNELS
+    """Of a network of many planes (`stream_network.StreamDnSS`)."""
+
+    def network(self) -> nn.Module:
+        """The untrained network: (N, span, H, W) spikes, (N, layers, H, W) planes -> (N, planes, H, W) rates."""
+        if self.layout.planes == 1:
+            return DnSS(window=self.layout.span, refine=self.refine)
+        layout = self.layout
+        return StreamDnSS(layout.span, layout.layers, layout.planes, layout.means, self.channels)
+
+    def carries(self, shape: tuple[int, int]) -> tuple[tuple[int, int, int], ...]:
+        """Shapes of the arrays that a pass leaves for the next, for frames of `shape`."""
+        if self.layout.planes == 1:
+            return ()
+        height, width = (n + -n % 4 for n in shape)
+        return (1, *shape), (CARRY, height // 2, width // 2)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Plain values, for a checkpoint.  `channels` are left out if they are `CHANNELS`: older files have none, and
+        their digests stay valid."""
+        plain = asdict(self)
+        return plain if self.channels != CHANNELS else {name: plain[name] for name in plain if name != "channels"}
+
+    @classmethod
+    def from_dict(cls, data: Any, where: str = "recipe") -> Recipe:
+        """The inverse of `to_dict`; InputError for anything else, whose text `where` begins."""
+        plain = declared(_DeclaredRecipe, data, where)
+        layout = WindowLayout(**plain.layout.model_dump())
+        return cls(layout, plain.target, plain.decoder, plain.refine, plain.channels)
+
+
+def _none_or_some(memory: float) -> float:
+    if 0 < memory < 1:
+        raise ValueError("it must be 0 or at least 1")
+    return memory
+
+
+_Frames = Annotated[int, Field(ge=0, le=1000)]
+_Memory = Annotated[float, Field(ge=1, le=1e6)]
+_Channels = Annotated[int, Field(ge=1, le=MOST_CHANNELS)]
+
+
+class _DeclaredLayout(Declared):
+    """Ranges: with `CHANNELS`, a network of any such layout has fewer than two million weights."""
+
+    past: _Frames
+    planes: Annotated[int, Field(ge=1, le=64)]
+    future: _Frames
+    half_widths: Annotated[tuple[_Frames, ...], Field(max_length=16, strict=False)]
+    memories: Annotated[tuple[_Memory, ...], Field(max_length=16, strict=False)]
+    gain_memory: Annotated[float, Field(ge=0, le=1e6), AfterValidator(_none_or_some)]
+
+
+class _DeclaredRecipe(Declared):
+    layout: _DeclaredLayout
+    target: Literal["clean_inverse_interval", "light"]
+    decoder: Literal["mus", "accumulate"]
+    refine: bool
+    channels: Annotated[tuple[_Channels, _Channels, _Channels], Field(strict=False)] = CHANNELS
+
+
+_PASSES = WindowLayout(
+    past=16, planes=16, future=16, half_widths=(4, 12, 22), memories=(64.0, 512.0), gain_memory=1024.0
+)
+RECIPES = {
+    "paper": Recipe(WindowLayout(past=20, planes=1, future=20), "clean_inverse_interval", "accumulate"),
+    "best": Recipe(_PASSES, "light", "accumulate"),
+    "fast": Recipe(_PASSES, "light", "accumulate", channels=(32, 64, 12)),
+}
+
+
+def recipe_of(mode: str) -> Recipe:
+    """The recipe of a mode: "paper", "best" or "fast"."""
+    if not isinstance(mode, str) or mode not in RECIPES:
+        raise unknown_name("denoiser mode", mode, RECIPES)
+    return RECIPES[mode]
+
+
+def checked_channels(channels: Sequence[int]) -> tuple[int, int, int]:
+    """Channels of a network of many planes; InputError unless they are three whole numbers in range."""
+    if isinstance(channels, str) or not isinstance(channels, Sequence) or len(channels) != 3:
+        raise InputError(f"channels is {shown(channels)}; it must be three numbers, as (64, 128, 24)")
+    half, quarter, head = (checked_whole(count, "channels", 1, MOST_CHANNELS) for count in channels)
+    return half, quarter, head

@@ -1,0 +1,1 @@
+"""Training: simulated streams, lessons, and a run that can go on where it was stopped."""

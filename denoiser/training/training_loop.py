@@ -1,0 +1,102 @@
+"""The loop of every training here: steps at a rate of learning that warms up and falls, validations, and files.
+
+The rate warms up over WARM_UP_STEPS steps and falls as a cosine to nothing at the end.  A run that is limited by
+minutes ends where the clock says.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+import torch
+from torch import Tensor
+from tqdm import tqdm
+
+from denoiser.training.resumable_run import Run
+from denoiser.training.training_options import TrainingOptions
+from spikecam_env.whole import whole_file, write_text_whole
+
+WARM_UP_STEPS = 100
+RUN_FILE = "last.pt"
+"""File in the folder of a run, from which it is resumed."""
+
+
+def learn(
+    limits: TrainingOptions,
+    run: Run,
+    step_of: Callable[[], Callable[[], Tensor]],
+    validate: Callable[[], dict[str, float]],
+    save: Callable[[], Path],
+    *,
+    began: float,
+    progress: bool,
+) -> Path:
+    """Take steps to the end of the run; returns the path of the weights.
+
+    Args:
+        limits: options of the training.
+        run: to go on with.
+        step_of: makes the step, a function that returns its loss; on a GPU a few steps are taken meanwhile
+            (`captured`).
+        validate: scores by name, "network_db" among them.
+        save: writes all files.
+        began: begin of this part of the run, by `time.monotonic`.
+        progress: shows a bar.
+    """
+    before, saved = run.seconds, time.monotonic()
+    bar = tqdm(total=limits.steps, initial=run.step, disable=not progress, mininterval=5.0, desc=limits.mode)
+    losses: list[Tensor] = []
+    run.set_rate(rate_at(limits.lr, 0, 0.0))  # of the steps that come before a capture
+    step = step_of()
+    while (done := share_done(limits, run)) < 1.0:
+        run.set_rate(rate_at(limits.lr, run.step, done))
+        losses.append(step())
+        run.step += 1
+        run.seconds = before + time.monotonic() - began
+        bar.update()
+        if run.step % limits.validate_every == 0:
+            scores = validate()
+            loss = float(torch.stack(losses).mean())
+            run.curve.append({"step": run.step, "seconds": run.seconds, "loss": loss, **scores})
+            losses.clear()
+            bar.set_postfix(loss=loss, db=scores["network_db"])
+        if run.step % limits.validate_every == 0 or time.monotonic() - saved > limits.save_every_s:
+            save()
+            saved = time.monotonic()
+    bar.close()
+    return save()
+
+
+def share_done(limits: TrainingOptions, run: Run) -> float:
+    """Share of the run that is over, by the clock where it is limited by minutes."""
+    return run.step / limits.steps if limits.minutes is None else run.seconds / (60 * limits.minutes)
+
+
+def rate_at(highest: float, step: int, done: float) -> float:
+    """The rate of learning of a step."""
+    return highest * min(1.0, (step + 1) / WARM_UP_STEPS) * 0.5 * (1 + math.cos(math.pi * done))
+
+
+def save_progress(folder: Path, run: Run) -> None:
+    """Write the file to resume from, and the validations as numbers and as a picture; each file appears whole."""
+    run.save(folder / RUN_FILE)
+    write_text_whole(folder / "curve.json", json.dumps(run.curve, indent=1))
+    if run.curve:
+        _plot(run.curve, folder / "curve.png")
+
+
+def _plot(curve: list[dict[str, float]], path: Path) -> None:
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(6, 4))
+    axes = figure.subplots()
+    for name in (key for key in curve[0] if key.endswith("_db")):
+        axes.plot([p["step"] for p in curve], [p[name] for p in curve], label=name.removesuffix("_db"))
+    axes.set(xlabel="step", ylabel="PSNR against the true light [dB]")
+    axes.legend()
+    with whole_file(path) as beside:
+        figure.savefig(beside, dpi=120)

@@ -1,0 +1,1 @@
+"""Scenes from scenes: later, faster; and the check of a scene's flow."""

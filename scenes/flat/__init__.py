@@ -1,0 +1,1 @@
+"""Flat scenes: textured planes, discs and shapes, painted key by key."""

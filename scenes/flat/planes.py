@@ -1,0 +1,98 @@
+"""Scenes on a plane, as tables: a tile and discs before it, key by key.  One call paints those of many cameras.
+
+A scene gives the places of its discs (`Plane`, a few numbers a key).  Threads, a key at a time, then paint the pictures
+of all keys of all scenes.  A picture does not depend on the others of the call.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from functools import partial
+from typing import Any
+
+import numpy as np
+
+from scenes.flat.painted_disk import PlacedDisc, Plane, paint_scenes, parts_of, places_of
+from scenes.keys import threads_for
+from scenes.protocol import Gaze
+from spikecam_env.sensor import Keyframes
+from spikecam_env.sensor.compiled_tools.intrinsics import address_of
+from spikecam_env.threads import together
+from spikecam_env.types import Floats, Pictures
+
+
+class PlanarScene:
+    """Base of scenes whose light is a `Plane`."""
+
+    def plane(self, start: int, stop: int, gaze: Gaze | None = None) -> Plane:
+        """The plane at the keys that cover frames [start, stop]."""
+        raise NotImplementedError
+
+    def radiance(self, start: int, stop: int, gaze: Gaze | None = None, *, device: Any = None) -> Keyframes:
+        """Keys that cover frames [start, stop]: (K,) float64 whole frames, (K, H, W) float32.
+
+        Args:
+            start: first frame.
+            stop: last frame.
+            gaze: of the camera; without one keys are multiples of a fixed interval, with one there are keys at `start`
+                and `stop` too, where its path may bend.
+            device: a torch device on which the light is painted, as a tensor, for `SpikeSensorBatch`.
+
+        Raises:
+            InputError: start is not before stop, or the device is missing.
+        """
+        planes = [self.plane(start, stop, gaze)]
+        if device is None:
+            return painted_planes(planes)[0]
+        from scenes.flat.planes_on_device import planes_on  # torch takes seconds
+
+        return planes_on(planes, device)[0]
+
+
+def painted_planes(planes: Sequence[Plane], threads: int | None = None) -> list[Keyframes]:
+    """The light of each, painted on threads as `scenes.keys.threads_for` counts them."""
+    light = [np.empty((len(plane.frame), *plane.shape), np.float32) for plane in planes]
+    paint_planes(planes, light, threads)
+    return [Keyframes.known(p.frame, pictures) for p, pictures in zip(planes, light, strict=True)]
+
+
+def paint_planes(planes: Sequence[Plane], light: Sequence[Pictures], threads: int | None = None) -> None:
+    """Paint the light of each into `light`, (K, H, W) of each."""
+    if not planes:
+        return
+    discs = [disc for plane in planes for disc in plane.discs]
+    done = keys = rows = parts = 0
+    scenes, textures, numbers = [], [], []
+    for plane, pictures in zip(planes, light, strict=True):
+        unmoved = 0 if plane.unmoved is None else address_of(plane.unmoved)
+        into = address_of(pictures), pictures.strides[0], len(pictures), keys
+        of_scene = done, done + len(plane.discs)
+        scenes.append((address_of(plane.tile), *plane.tile.shape, *plane.shape, unmoved, *into, *of_scene, parts))
+        for disc in plane.discs:
+            texels = disc.texels
+            textures.append((address_of(texels.pairs), texels.side, rows))
+            numbers.append((disc.radius, float(texels.low), float(texels.step)))
+            rows += len(pictures)
+        keys, done = keys + len(pictures), of_scene[1]
+        parts += parts_of(len(pictures), plane.shape[0])
+    work = (
+        np.zeros((1, 8), np.int64),
+        parts,
+        np.array(scenes, np.int64),
+        np.concatenate([plane.pan for plane in planes]),
+        np.concatenate([plane.tilt for plane in planes]),
+        np.array(textures, np.int64).reshape(-1, 3),
+        np.array(numbers, np.float64).reshape(-1, 3),
+        _places(discs),
+    )
+    together([partial(paint_scenes, *work)] * threads_for(keys, threads), shared=True)
+
+
+def _places(discs: Sequence[PlacedDisc]) -> Floats:
+    """Places of each at each of its keys, one disc after another, for `paint_scenes`."""
+    if not discs:
+        return np.empty((0, 6))
+    keys = [len(disc.x) for disc in discs]
+    x, y, angle = (np.concatenate(parts) for parts in zip(*((d.x, d.y, d.angle) for d in discs), strict=True))
+    side = np.repeat([float(disc.texels.side) for disc in discs], keys)
+    return places_of(side, np.repeat([disc.radius for disc in discs], keys), x, y, angle)

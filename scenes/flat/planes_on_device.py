@@ -1,0 +1,181 @@
+"""Scenes on a plane painted on a torch device: textures are uploaded once, and a few numbers a key go there.
+
+The law is that of `painted_disk.py`: a bilinear tile, discs over it by the share of a pixel inside the rim.  Light
+differs from the processor's by the rounding of float32.
+"""
+
+from __future__ import annotations
+
+from collections import OrderedDict
+from collections.abc import Callable, Sequence
+from typing import Any
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+from torch import Tensor
+from torch.nn.functional import grid_sample
+
+from scenes.flat.painted_disk import Plane, Texels, places_of
+from spikecam_env.sensor import Keyframes
+from spikecam_env.sensor.kernels.cuda import checked_device
+from spikecam_env.types import Floats, Pictures
+
+TOGETHER = 1 << 25
+"""Pixels that are painted at a time: 1 GB of intermediate results."""
+
+KEPT = 512
+"""Textures and tiles that are kept on devices: those of all tasks."""
+
+OF_TILE, OF_DISC = 4, 6
+"""Numbers a key: of the tile column, row, and shares of the next ones; of each disc as `places_of` has them."""
+
+
+def planes_on(planes: Sequence[Plane], device: str | torch.device) -> list[Keyframes]:
+    """As `scenes.flat.planes.painted_planes`, radiance being a tensor on the device.
+
+    Planes that show the same textures are painted in one go, since a key is a picture of its own.
+
+    Raises:
+        InputError: the device is missing.
+    """
+    checked = checked_device(device, "leave device out")
+    groups: dict[Any, list[int]] = {}
+    for number, plane in enumerate(planes):
+        groups.setdefault(_look(plane), []).append(number)
+    light: dict[int, Tensor] = {}
+    for numbers in groups.values():
+        alike = [planes[number] for number in numbers]
+        pictures = PlanePainter(alike[0], checked).painted(alike)
+        light |= zip(numbers, pictures.split([len(plane.frame) for plane in alike]), strict=True)
+    return [keys_of(plane.frame, light[number]) for number, plane in enumerate(planes)]
+
+
+def repeated_on(
+    array: NDArray[Any],
+    made: Callable[[NDArray[Any]], Pictures],
+    frame: Floats,
+    first: tuple[Floats, Floats],
+    shape: tuple[int, int],
+    step: int,
+    device: str | torch.device,
+) -> Keyframes:
+    """Keys of a repeated tile.
+
+    Args:
+        array: from which `made` makes the tile (h, w).
+        made: is called once for an array.
+        frame: (K,) of the keys.
+        first: x and y (K,) of the first pixel [samples].
+        shape: (rows, columns) of the picture.
+        step: samples from pixel to pixel.
+        device: on which it is painted.
+    """
+    tile = uploaded(array, checked_device(device, "leave device out"), made)
+    numbers = torch.from_numpy(tile_numbers(*first, tile.shape).astype(np.float32)).to(tile.device)
+    many = max(1, TOGETHER // (shape[0] * shape[1]))
+    return keys_of(frame, torch.cat([tile_on(tile, some, shape, step) for some in numbers.split(many)]))
+
+
+def keys_of(frame: Floats, radiance: Tensor) -> Keyframes:
+    """Keys at frames (K,) whose light (K, H, W) float32 lies on a device; known to be right."""
+    pictures: Any = radiance
+    return Keyframes.known(frame, pictures)
+
+
+class PlanePainter:
+    """Paints planes with the tile and the discs' textures of `plane`, wherever these lie, on a device."""
+
+    def __init__(self, plane: Plane, device: torch.device) -> None:
+        self._shape, self._device = plane.shape, device
+        self._tile = uploaded(plane.tile, device)
+        self._discs = [(_bits(disc.texels, device), disc.texels, disc.radius) for disc in plane.discs]
+
+    def painted(self, planes: Sequence[Plane]) -> Tensor:
+        """(K, H, W) float32, the keys of one plane after those of another."""
+        numbers = self.numbers(planes)
+        still = bool((numbers[:, :OF_TILE] == numbers[:1, :OF_TILE]).all())
+        on_device = torch.from_numpy(numbers).to(self._device)
+        many = max(1, TOGETHER // (self._shape[0] * self._shape[1]))
+        return torch.cat([self.paint(some, still) for some in on_device.split(many)])
+
+    def numbers(self, planes: Sequence[Plane]) -> Pictures:
+        """(K, OF_TILE + OF_DISC for each disc) numbers of each key."""
+        pan, tilt = (np.concatenate([getattr(plane, name) for plane in planes]) for name in ("pan", "tilt"))
+        of_keys = [tile_numbers(pan, tilt, self._tile.shape)]
+        for d, (_, texels, radius) in enumerate(self._discs):
+            of_disc = ([getattr(plane.discs[d], name) for plane in planes] for name in ("x", "y", "angle"))
+            x, y, angle = map(np.concatenate, of_disc)
+            of_keys.append(places_of(np.full(len(x), float(texels.side)), np.full(len(x), radius), x, y, angle))
+        return np.concatenate(of_keys, axis=1).astype(np.float32)
+
+    def paint(self, numbers: Tensor, still: bool = False) -> Tensor:
+        """(K, H, W) light, from `numbers` on the device; with `still` the tile lies in each key as in the first."""
+        picture = tile_on(self._tile, numbers[:1] if still else numbers, self._shape)
+        for d, (bits, texels, radius) in enumerate(self._discs):
+            first = OF_TILE + d * OF_DISC
+            picture = _over(picture, bits, texels, radius, numbers[:, first : first + OF_DISC])
+        return picture.expand(len(numbers), *self._shape)
+
+
+def tile_numbers(x: Floats, y: Floats, shape: Sequence[int]) -> Floats:
+    """(K, OF_TILE) of a tile of `shape`, seen from places x, y (K,) [texels]."""
+    left, top = np.floor(x), np.floor(y)
+    return np.stack([left % shape[1], top % shape[0], x - left, y - top], axis=1)
+
+
+def tile_on(tile: Tensor, numbers: Tensor, shape: tuple[int, int], step: int = 1) -> Tensor:
+    """(K, H, W): a repeated tile, bilinear, from numbers (K, OF_TILE) or more, with `step` texels a pixel."""
+    left, top, right_share, lower_share = (numbers[:, i, None, None] for i in range(OF_TILE))
+    row = top.long() + step * torch.arange(shape[0], device=tile.device)[None, :, None]
+    column = left.long() + step * torch.arange(shape[1], device=tile.device)[None, None, :]
+    upper, lower = row % tile.shape[0], (row + 1) % tile.shape[0]
+    here, right = column % tile.shape[1], (column + 1) % tile.shape[1]
+    to_left = torch.lerp(tile[upper, here], tile[lower, here], lower_share)
+    to_right = torch.lerp(tile[upper, right], tile[lower, right], lower_share)
+    return torch.lerp(to_left, to_right, right_share)
+
+
+def _over(behind: Tensor, bits: Tensor, texels: Texels, radius: float, places: Tensor) -> Tensor:
+    """A disc over the picture behind it (K or 1, H, W), at places (K, OF_DISC)."""
+    x, y, u0, v0, cosine, sine = (places[:, i, None, None] for i in range(OF_DISC))
+    row = torch.arange(behind.shape[1], device=bits.device, dtype=torch.float32)[None, :, None]
+    column = torch.arange(behind.shape[2], device=bits.device, dtype=torch.float32)[None, None, :]
+    to_grid = 2.0 / (texels.side - 1)  # places of texels as -1 .. 1
+    where = torch.stack([u0 + cosine * column - sine * row, v0 + sine * column + cosine * row], dim=-1)
+    seen = grid_sample(
+        bits.expand(len(places), 1, -1, -1), where * to_grid - 1.0, padding_mode="border", align_corners=True
+    )[:, 0]
+    cover = (radius + 0.5 - torch.hypot(column - x, row - y)).clamp(0.0, 1.0)
+    return torch.lerp(behind, float(texels.low) + float(texels.step) * seen, cover)
+
+
+def _look(plane: Plane) -> tuple[Any, ...]:
+    """Features common to planes that are painted in one go."""
+    discs = (
+        (id(disc.texels.pairs), float(disc.texels.low), float(disc.texels.step), disc.radius) for disc in plane.discs
+    )
+    return plane.shape, id(plane.tile), *discs
+
+
+def _bits(texels: Texels, device: torch.device) -> Tensor:
+    """(side, side) float32, in steps of the texels."""
+    side = texels.side
+    return uploaded(texels.pairs, device, lambda pairs: (pairs & 0xFFFF).astype(np.float32).reshape(side, side))
+
+
+def uploaded(
+    array: NDArray[Any], device: torch.device, made: Callable[[NDArray[Any]], Pictures] = np.asarray
+) -> Tensor:
+    """A tensor on a device, made of an array that is never written to; the last KEPT are kept there."""
+    key = id(array), str(device)
+    if key not in _UPLOADED:
+        _UPLOADED[key] = array, torch.from_numpy(np.ascontiguousarray(made(array))).to(device)
+        if len(_UPLOADED) > KEPT:
+            _UPLOADED.popitem(last=False)
+    _UPLOADED.move_to_end(key)
+    return _UPLOADED[key][1]
+
+
+_UPLOADED: OrderedDict[tuple[int, str], tuple[NDArray[Any], Tensor]] = OrderedDict()
+"""With the array, so that no other gets its id."""

@@ -1,0 +1,1 @@
+"""Surfaces: shapes and mesh files as triangles with their albedo."""
