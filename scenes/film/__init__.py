@@ -1,6 +1,6 @@
 """Films and pictures of a user's own, as linear light."""
 
-from scenes.film.read_film import Film, FilmOptions, read_film
+from scenes.film.film_files import Film, FilmOptions, read_film
 from spikecam_env.renamed import old_names
 
 __all__ = ["Film", "FilmOptions", "read_film"]

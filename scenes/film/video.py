@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from scenes.exposure import checked_interval
-from scenes.film.read_film import Film, FilmOptions, fitted, given_times, read_array, read_film
+from scenes.film.film_files import Film, FilmOptions, fitted, given_times, read_array, read_film
 from scenes.film.transfer import CHANNELS, curve, grey, light_of
 from scenes.keys import LONGEST_INTERVAL, check_frames, interval_for, paint_keys
 from scenes.protocol import Gaze, Truth

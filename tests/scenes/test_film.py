@@ -492,7 +492,7 @@ def test_a_film_has_a_length_that_frames_can_count(rate: float) -> None:
 
 def test_a_film_that_memory_does_not_hold_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     path = write_film(tmp_path / "f.mkv", greys(range(20)), color_trc=13)
-    monkeypatch.setattr("scenes.film.read_film.MOST_BYTES", 10 * 32 * 32 * 4)
+    monkeypatch.setattr("scenes.film.film_files.MOST_BYTES", 10 * 32 * 32 * 4)
     with pytest.raises(InputError, match="more than 11 pictures"):
         VideoScene(path)
     assert quiet(path, shape=(16, 16)).pictures == 20
