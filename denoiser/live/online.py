@@ -123,10 +123,10 @@ class LiveDnSS:
         self._carried: infer.Carried = ()
 
     def warm_up(self) -> None:
-        """Do the slow work of the first picture now, such as to compile; forgets the stream."""
-        frames = HISTORY + self._layout.span
-        self.ring.push(np.zeros((frames, self.ring.rows.shape[1]), np.uint8))
-        self.picture()
+        """Do the slow work of the first pictures now, such as to compile; forgets the stream."""
+        for frames in (HISTORY + self._layout.span, self.step):  # the second goes on from the first
+            self.ring.push(np.zeros((frames, self.ring.rows.shape[1]), np.uint8))
+            self.picture()
         self.reset()
 
     def push(self, packed: NDArray[np.uint8]) -> None:

@@ -3,8 +3,8 @@
     source ──reader──▶ ring of LiveDnSS ──denoiser──▶ newest picture ──▶ screen, window or film
 
 The reader takes a source that waits, a file, at the pace of a camera that sends it.  Frames that it has not taken
-BUFFER_S after they were due are lost, and counted.  Other sources are read as fast as they bring frames, and wait where
-that is too slow.
+BUFFER_S after they were due are lost, and counted; the last that a picture needs are taken, however late.  Other
+sources are read as fast as they bring frames, and wait where that is too slow.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from denoiser.live.online import LiveDnSS
-from spikecam_env.errors import InputError
+from spikecam_env.errors import InputError, NotReadyError
 from spikecam_env.streams.sources import Source
 
 PICTURES_S = 30.0
@@ -204,11 +204,10 @@ class Session:
         self._start_s = self._start_s or now
         due = int((now - self._start_s) * self._rate) - self._taken - self._lost
         late = due - int(BUFFER_S * self._rate)
-        if late > 0:
-            self._source.skip(late)
-            self.live.skip(late)
-            self._lost += late
-            due -= late
+        if late > 0 and (lost := self._source.skip(late, keep=self.live.needed)):
+            self.live.skip(lost)
+            self._lost += lost
+            due -= lost
         return min(due, BLOCK)
 
     def _take(self, count: int) -> None:
@@ -231,7 +230,10 @@ class Session:
                 time.sleep(TICK_S)
 
     def _show(self) -> None:
-        rate = self.live.picture()
+        try:
+            rate = self.live.picture()
+        except NotReadyError:  # frames were lost since it was ready
+            return
         window, frame = self.live.window, self.live.frame
         assert window is not None and frame is not None
         noisy = window.spikes.sum(axis=0, dtype=np.uint16) / np.float32(len(window.spikes))

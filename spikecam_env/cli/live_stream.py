@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
@@ -18,11 +19,13 @@ from spikecam_env.errors import InputError, unknown_name
 from spikecam_env.numbers import Count, Positive, Range, Rpm, Seed
 
 if TYPE_CHECKING:
-    from spikecam_env.streams.sources import Source
+    from spikecam_env.streams.sources import Source, StoredFrames
 
 MOST_PICTURES_S = 1000.0
 SLOWEST, FASTEST = 1e-6, 1e6
 """Speeds of a file or a scene: a frame in 25 s, and more frames a second than any machine takes in."""
+READ_AHEAD = 2.0
+"""Frames that can be read a second, over those that are needed: the reader has half a core beside the network."""
 
 
 @dataclass
@@ -81,13 +84,15 @@ class Live:
         with self._source() as source:
             live = LiveDnSS(source.shape, self.weights or self.mode, passes=self.passes, unit=self.calibration)
             pace = {"speed": self.speed or 1.0, "pictures": self.pictures}
-            with Session(source, live, **pace, frames=self.frames, seconds=self.seconds) as session:
-                watching = Watching(session, source, str(self.weights or self.mode))
+            session = Session(source, live, **pace, frames=self.frames, seconds=self.seconds)
+            watching = Watching(session, source, str(self.weights or self.mode))
+            with session:
                 if self.film is not None:
                     watching.as_a_film(self.film)
                 elif has_display():
                     watching.in_a_window()
                 else:
+                    print("no display: the figures alone; --film FILE.mp4 writes the pictures", flush=True)
                     watching.as_figures()
             print(table([watching.summary()]))
         if self.film is not None:
@@ -108,7 +113,7 @@ class Live:
         from spikecam_env.cli.live.simulated import SimulatedSource
         from spikecam_env.cli.named_scene import scene_named
         from spikecam_env.sensor import SpikeSensor
-        from spikecam_env.streams.sources import is_flow, open_source
+        from spikecam_env.streams.sources import StoredFrames, is_flow, open_source
 
         if self.source in SCENES:
             model = self.camera.load()
@@ -121,4 +126,18 @@ class Live:
         with open_source(self.source, loop=self.loop, **self.reading.options()) as source:
             if not source.waits and self.speed is not None:
                 raise InputError(f"--speed {self.speed:g}: {source.title} has a pace of its own; leave --speed")
+            if isinstance(source, StoredFrames):
+                _warn_of_slow_reading(source, self.speed or 1.0)
             yield source
+
+
+def _warn_of_slow_reading(source: StoredFrames, speed: float) -> None:
+    rate, needed = source.read_rate(), speed * source.frame_rate_hz
+    if rate < READ_AHEAD * needed:
+        warnings.warn(
+            f"{source.title} is read at {rate:.0f} frames a second, and {needed:.0f} are needed beside the network: "
+            f"frames will be lost; give --speed {rate / READ_AHEAD / source.frame_rate_hz:.1g}, or a .dat file, which "
+            "is read several times as fast",
+            UserWarning,
+            stacklevel=2,
+        )

@@ -16,6 +16,7 @@ import io
 import os
 import socket
 import stat
+import time
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import dataclass, field
@@ -57,6 +58,8 @@ SET_PIPE_SIZE = 1031
 """F_SETPIPE_SZ of Linux; Python has the name from 3.10 on, there alone."""
 _REVERSED = np.packbits(np.unpackbits(np.arange(256, dtype=np.uint8)[:, None], axis=1)[:, ::-1], axis=1)[:, 0]
 """(256,) a byte with its bits in the other order."""
+MEASURED = 512
+"""Frames that `StoredFrames.read_rate` reads."""
 FLOWING = ("height", "width", "crop_width", "flip", "bit_order")
 """Options of pipes and sockets."""
 
@@ -87,8 +90,8 @@ class Source(Protocol):
     def read(self, rows: Packed) -> int:
         """Fill rows with the next frames, from the first row on; how many, 0 at the end of the stream."""
 
-    def skip(self, frames: int) -> None:
-        """Leave out the next frames."""
+    def skip(self, frames: int, keep: int = 0) -> int:
+        """Leave out the next frames, but none of the last `keep` of a stream that ends; how many were left out."""
 
 
 @dataclass
@@ -116,8 +119,18 @@ class StoredFrames:
             self._next += count
         return count
 
-    def skip(self, frames: int) -> None:
-        self._next += frames
+    def skip(self, frames: int, keep: int = 0) -> int:
+        skipped = frames if self.loop else max(0, min(frames, self.frames - self._next - keep))
+        self._next += skipped
+        return skipped
+
+    def read_rate(self) -> float:
+        """Frames a second at which the first frames are read; measured, on a second reading."""
+        rows = np.empty((min(MEASURED, self.frames), packed_bytes(self.shape)), np.uint8)
+        self.fetch(0, rows[:1])
+        began = time.perf_counter()
+        self.fetch(0, rows)
+        return len(rows) / max(time.perf_counter() - began, 1e-9)
 
 
 @dataclass
@@ -159,7 +172,7 @@ class Flowing:
             self.cut = f"{self.title} ended in the middle of a frame, with {here}; {taken}"
         return frames
 
-    def skip(self, frames: int) -> None:
+    def skip(self, frames: int, keep: int = 0) -> int:
         raise InputError(f"{self.title} brings frames when it has them; none can be left out")
 
 

@@ -19,6 +19,7 @@ from spikecam_env.cli.live.simulated import SimulatedSource
 from spikecam_env.cli.panels import MARGIN, display
 from spikecam_env.sensor import SpikeSensor
 from spikecam_env.streams import pack_frames, save_vidar_dat
+from spikecam_env.streams.sources import StoredFrames
 from tests.commands import film_in, spikecam
 
 SHAPE = (24, 40)
@@ -75,7 +76,9 @@ def standard_input(content: bytes) -> Iterator[None]:
 
 def test_without_a_display_the_figures_of_a_file_are_printed(recording: Path, capsys) -> None:
     assert spikecam("live", recording, "--loop", "--frames", 1200, "--speed", 0.05) == 0
-    row = figures(capsys.readouterr().out)
+    printed = capsys.readouterr()
+    assert printed.out.startswith("no display: the figures alone; --film FILE.mp4 writes the pictures")
+    row = figures(printed.out)
     assert row["frames"] == 1200 and row["lost"] < 1200
     assert row["seconds"] >= 0.6 and row["x real time"] <= 0.051
     assert 1 <= row["pictures"] <= 30 * row["seconds"] + 2
@@ -98,6 +101,15 @@ def test_a_film_is_what_a_window_would_show(recording: Path, capsys, tmp_path: P
     assert rough[1] < 0.8 * rough[0]
     assert np.corrcoef(by_pixel[0].ravel(), by_pixel[1].ravel())[0, 1] > 0.7
     assert max(np.abs(picture - pictures[0]).mean() for picture in pictures) > 1
+
+
+def test_a_file_that_is_read_too_slowly_to_be_live_is_named_at_the_start(recording: Path, capsys, monkeypatch) -> None:
+    monkeypatch.setattr(StoredFrames, "read_rate", lambda _: 3000.0)
+    assert spikecam("live", recording, "--loop", "--frames", 64, "--speed", 0.05) == 0
+    said = capsys.readouterr().err
+    assert "disk.dat is read at 3000 frames a second" in said and "2000 are needed" in said and "--speed 0.04" in said
+    assert spikecam("live", recording, "--loop", "--frames", 64, "--speed", 0.03) == 0
+    assert "warning" not in capsys.readouterr().err
 
 
 def test_packed_frames_are_taken_from_standard_input(spikes: np.ndarray, capfd) -> None:

@@ -56,5 +56,5 @@ class SimulatedSource:
         time.sleep(max(self._due_s - now, 0.0))
         self._due_s = max(self._due_s, now) + block_s
 
-    def skip(self, frames: int) -> None:
+    def skip(self, frames: int, keep: int = 0) -> int:
         raise InputError(f"{self.title} is simulated; none of its frames can be left out")
