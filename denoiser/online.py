@@ -19,6 +19,7 @@ import numpy as np
 import torch
 from numpy.typing import ArrayLike, NDArray
 from torch import nn
+from tqdm import tqdm
 
 from denoiser.decoders import accumulate, mus
 from denoiser.ground.number_type import PRECISIONS, number_type
@@ -387,9 +388,33 @@ def denoise(spikes: ArrayLike, mode: str = "best", *, chunk: int = 256, **option
     """
     frames, chunk = as_spikes(spikes), checked_count(chunk, "chunk")
     online = OnlineDnSS.pretrained(mode, **options)
-    pieces = [online.push(frames[:0]), *(online.push(frames[i : i + chunk]) for i in range(0, len(frames), chunk))]
-    pieces.append(online.flush())
+    pieces = [online.push(frames[:0]), *(piece for _, piece in pieces_of(online, frames, chunk))]
     if online.output == "both":
         spikes_out, rates_out = zip(*pieces, strict=True)
         return np.concatenate(spikes_out), np.concatenate(rates_out)
     return np.concatenate(pieces)
+
+
+def pieces_of(
+    online: OnlineDnSS, spikes: NDArray[np.uint8], chunk: int = 16, title: str | None = None
+) -> Iterator[tuple[int, Any]]:
+    """Push a whole stream, and flush it.
+
+    Args:
+        online: before its first frame.
+        spikes: (T, H, W).
+        chunk: frames that are pushed at a time.
+        title: of a bar of progress; None: no bar.
+
+    Yields:
+        (first, piece): the number of the first denoised frame, and the frames as `push` gives them.  The last piece is
+        that of `flush`.
+    """
+    first = 0
+    with tqdm(total=len(spikes), desc=title, unit="frame", leave=False, disable=title is None) as bar:
+        for start in range(0, len(spikes) + chunk, chunk):
+            piece: Any = online.push(spikes[start : start + chunk]) if start < len(spikes) else online.flush()
+            yield first, piece
+            count = len(piece[0] if online.output == "both" else piece)
+            first += count
+            bar.update(count)

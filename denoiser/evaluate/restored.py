@@ -8,12 +8,9 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from tqdm import tqdm
 
-from denoiser.online import OnlineDnSS
+from denoiser.online import OnlineDnSS, pieces_of
 
-CHUNK = 16
-"""Frames pushed at a time."""
 Weights = Mapping[str, str | os.PathLike[str]]
 """Checkpoint by mode, instead of the shipped ones."""
 
@@ -44,16 +41,7 @@ def restored(online: OnlineDnSS, spikes: NDArray[np.uint8], title: str = "denois
     """(T, H, W) spikes through a denoiser from its first frame, with a bar of progress."""
     stream = online.another("both")
     fired, rates, whole = np.empty_like(spikes), np.empty(spikes.shape, np.float32), 0
-    ready = 0
-    with tqdm(total=len(spikes), desc=title, unit="frame", leave=False) as bar:
-        for start in range(0, len(spikes) + CHUNK, CHUNK):
-            over = start >= len(spikes)
-            whole = ready if over else whole
-            piece = stream.flush() if over else stream.push(spikes[start : start + CHUNK])
-            count = len(piece[0])
-            fired[ready : ready + count], rates[ready : ready + count] = piece
-            ready += count
-            bar.update(count)
-            if over:
-                break
+    for whole, piece in pieces_of(stream, spikes, title=title):
+        part = slice(whole, whole + len(piece[0]))
+        fired[part], rates[part] = piece
     return Restored(fired, rates, whole)

@@ -26,7 +26,7 @@ from denoiser.decoders import accumulate, held, mus
 from denoiser.evaluate import still
 from denoiser.evaluate.exposed import CLASSICAL, ExposedStreams, Planes, StreamCase, film
 from denoiser.ground.plain_torch import read_plain
-from denoiser.online import OnlineDnSS
+from denoiser.online import OnlineDnSS, pieces_of
 from denoiser.weights import load_weights
 from spikecam_env.errors import InputError
 from spikecam_env.types import Spikes
@@ -164,15 +164,12 @@ def decoded(planes: Planes, decoder: str) -> Spikes:
 def denoised(online: OnlineDnSS, exposed: ExposedStreams) -> Planes:
     """Rate planes of the judged frames; no more frames are pushed than they need."""
     planes = np.empty((exposed.stop - exposed.first, *exposed.noisy.shape[1:]), np.float32)
-    ready = pushed = 0
-    while ready < exposed.stop:
-        chunk = exposed.noisy[pushed : pushed + CHUNK]
-        new = online.push(chunk) if len(chunk) else online.flush()
-        pushed += len(chunk)
-        begin, end = max(ready, exposed.first), min(ready + len(new), exposed.stop)
+    for first, new in pieces_of(online, exposed.noisy, CHUNK):
+        begin, end = max(first, exposed.first), min(first + len(new), exposed.stop)
         if end > begin:
-            planes[begin - exposed.first : end - exposed.first] = new[begin - ready : end - ready]
-        ready += len(new)
+            planes[begin - exposed.first : end - exposed.first] = new[begin - first : end - first]
+        if end == exposed.stop:
+            break
     return planes
 
 

@@ -9,9 +9,8 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from tqdm import tqdm
 
-from denoiser import OnlineDnSS
+from denoiser.online import OnlineDnSS, pieces_of
 from spikecam_env.cli.before_after import WINDOW, instant_panel, light_db, light_panel, mean_panel, over, white_of
 from spikecam_env.cli.panels import PicturePanel
 from spikecam_env.cli.recording import HDF5
@@ -20,8 +19,6 @@ from spikecam_env.streams import middleTFI, middleTFP, read_truth
 from spikecam_env.streams.hdf5 import is_recording
 from spikecam_env.types import Pictures, Spikes
 
-CHUNK = 16
-"""Frames pushed at a time."""
 MOST_PICTURES = 240
 """In a film: 8 seconds."""
 MOST_JUDGED = 12
@@ -168,12 +165,8 @@ def restore(noisy: Spikes, online: OnlineDnSS, at: Iterable[int]) -> tuple[Spike
     wanted = set(at)
     planes: dict[int, Pictures] = {}
     spikes = np.empty_like(noisy)
-    ready, began = 0, time.perf_counter()
-    with tqdm(total=len(noisy), desc="denoise", unit="frame", leave=False) as bar:
-        for start in range(0, len(noisy) + CHUNK, CHUNK):
-            fired, rates = online.push(noisy[start : start + CHUNK]) if start < len(noisy) else online.flush()
-            spikes[ready : ready + len(fired)] = fired
-            planes |= {frame: plane for frame, plane in enumerate(rates, ready) if frame in wanted}
-            ready += len(fired)
-            bar.update(len(fired))
+    began = time.perf_counter()
+    for first, (fired, rates) in pieces_of(online, noisy, title="denoise"):
+        spikes[first : first + len(fired)] = fired
+        planes |= {frame: plane for frame, plane in enumerate(rates, first) if frame in wanted}
     return spikes, planes, time.perf_counter() - began

@@ -13,6 +13,7 @@ from tqdm import tqdm
 
 from denoiser import OnlineDnSS
 from denoiser.evaluate.metrics import psnr_db
+from denoiser.evaluate.restored import restored
 from scenes.protocol import Gaze
 from spikecam_env.checked import checked_memory
 from spikecam_env.cli.before_after import WINDOW, instant_panel, light_db, light_panel, mean_panel, white_of
@@ -192,7 +193,8 @@ def comparison(run: Streamed) -> list[dict[str, Any]]:
     noisy, clean = run.noisy[stretch], run.clean[stretch]
     streams: dict[str, tuple[Spikes, Pictures | None]] = {"noisy": (noisy, None)}
     for mode in ("paper", "best"):
-        streams[mode] = _denoised(mode, noisy)
+        online = OnlineDnSS.pretrained(mode, output="both")
+        streams[mode] = restored(online, noisy, f"compare ({mode})")[:2]
     streams["clean twin"] = (clean, None)
     middles = [b * BLOCK + BLOCK // 2 for b in range(2, len(noisy) // BLOCK - 2)]
     rows = []
@@ -210,15 +212,6 @@ def comparison(run: Streamed) -> list[dict[str, Any]]:
                 scores.setdefault(f"TFP {window}, twin", []).append(psnr_db(picture, twin, peak))
         rows.append(row | {measure: float(np.mean(values)) for measure, values in scores.items()})
     return rows
-
-
-def _denoised(mode: str, spikes: Spikes) -> tuple[Spikes, Pictures]:
-    online = OnlineDnSS.pretrained(mode, output="both")
-    parts = []
-    for start in tqdm(range(0, len(spikes), BLOCK), desc=f"compare ({mode})", unit="block", leave=False):
-        parts.append(online.push(spikes[start : start + BLOCK]))
-    fired, planes = zip(*parts, online.flush(), strict=True)
-    return np.concatenate(fired), np.concatenate(planes)
 
 
 def _compile(env: gymnasium.Env, online: OnlineDnSS, shape: tuple[int, int]) -> None:
