@@ -22,20 +22,20 @@ from torch import nn
 from tqdm import tqdm
 
 from denoiser.decoders import accumulate, mus
-from denoiser.ground.number_type import PRECISIONS, number_type
-from denoiser.passes import infer
-from denoiser.passes.chain import Crossfade, PassChain, Rates
-from denoiser.passes.given_network import check_network, has_passes
-from denoiser.passes.on_device import DeviceChain, DeviceStreams, kept, spikes_on, unpacked_on
+from denoiser.passes.crossfade import Crossfade
+from denoiser.passes.engine import Engine
+from denoiser.passes.infer import on_host
+from denoiser.passes.on_device import DevicePasses, spikes_on, unpacked_on
+from denoiser.passes.on_host import HostPasses
 from denoiser.passes.pixel_map import PixelMap
 from denoiser.passes.recipe import Recipe
-from denoiser.passes.window import PassWindow, check_like
+from denoiser.passes.window import check_like
 from denoiser.weights import digest, load_weights, pretrained_path
 from spikecam_env.calibration import Calibration
 from spikecam_env.checked import checked_count
 from spikecam_env.errors import InputError, NotReadyError, unknown_name
-from spikecam_env.sensor.kernels.cuda import checked_device
 from spikecam_env.streams.packing import as_spikes, unpack_frames
+from spikecam_env.types import Pictures
 
 OUTPUTS = ("spikes", "rate", "both")
 ENGINES = ("torch", "captured")
@@ -64,7 +64,7 @@ class OnlineDnSS:
             default: the recipe's.
         unit: `best` mode only: the calibrated unit: maps (gain, dark) of shape (H, W), a `Calibration` of SNEE, the
             path of its maps.h5, or a `PixelMap`.
-        overlap: `best` mode only: two chains of passes, half a pass apart, and their mean (`chain.py`): less
+        overlap: `best` mode only: two chains of passes, half a pass apart, and their mean (`crossfade.py`): less
             error, no seams, twice the work.
         device: `best` mode only: windows, planes and network as tensors there, "cuda", "cuda:1" or "cpu"
             (`on_device.py`).  In float32 rates differ by less than 1e-5 from those without.  Spikes, and the mean
@@ -95,35 +95,19 @@ class OnlineDnSS:
         overlap: bool = False,
         device: str | torch.device | None = None,
     ) -> None:
-        check_network(recipe, network)
         self.output = _checked_output(output)
-        if not isinstance(precision, str) or precision not in PRECISIONS:
-            raise unknown_name("precision", precision, PRECISIONS)
-        if engine == "openvino":
-            raise InputError("engine 'openvino' was removed: it was 1.06 times as fast as 'torch'; take 'torch'")
-        if not isinstance(engine, str) or engine not in ENGINES:
-            raise unknown_name("engine", engine, ENGINES)
-        if checked_count(stride, "stride") > 1 and recipe.layout.planes > 1:
-            raise InputError(f"stride is {stride}; it must be 1 for a network of many planes a pass")
+        self.engine = Engine.of(
+            recipe, network, precision=precision, kind=engine, stride=stride, unit=unit, device=device
+        )
+        """The network, ready for passes."""
         if decoder is not None and (not isinstance(decoder, str) or decoder not in _DECODERS):
             raise unknown_name("decoder", decoder, _DECODERS)
-        if unit is not None and not recipe.layout.gain_memory:
-            raise InputError("this network takes no calibration map; leave unit out, or use mode 'best'")
         if not isinstance(overlap, bool):
             raise InputError(f"overlap is {overlap!r}; it must be True or False")
         if overlap and recipe.layout.planes % 2:
             raise InputError("overlap is True; passes of this network cannot overlap by half, leave it False")
-        self._recipe, self._stride, self._overlap = recipe, int(stride), overlap
+        self._overlap = overlap
         self._decoder = recipe.decoder if decoder is None else decoder
-        self._unit = None if unit is None else PixelMap.of(unit)
-        self._device = None if device is None else checked_device(device, "leave device out")
-        if engine == "captured" and device is None:
-            raise InputError("engine 'captured' replays passes on a device; give one, device='cuda', or take 'torch'")
-        self._type = number_type(precision, self._device)
-        self._engine = engine
-        self._network = infer.prepared(network, self._type)
-        if self._device is not None:
-            self._network = _moved(self._network, self._device)
         self._digest = digest(recipe, network.state_dict())
         self.reset()
 
@@ -154,16 +138,16 @@ class OnlineDnSS:
     @property
     def latency(self) -> int:
         """Frames between a frame's arrival and its output, at most."""
-        return self._recipe.layout.latency
+        return self.engine.recipe.layout.latency
 
     @property
     def shape(self) -> tuple[int, int] | None:
         """(rows, columns) of the stream, once known."""
-        return self._chains[0].shape if self._chains else None
+        return self._passes[0].shape if self._passes else None
 
     def reset(self) -> None:
         """Forget the stream; the next may have another size."""
-        self._chains: list[Any] = []  # of Chain, or of DeviceChain
+        self._passes: list[HostPasses | DevicePasses] = []  # of the one stream; two that overlap
         self._as_tensors = False
         self._mixing: Crossfade | None = None
         self._decoding: Any = None
@@ -172,7 +156,7 @@ class OnlineDnSS:
     @property
     def device(self) -> torch.device | None:
         """Where windows and network are; None: windows on the processor, in compiled code."""
-        return self._device
+        return self.engine.device
 
     def push(self, spikes: ArrayLike | torch.Tensor) -> Denoised:
         """(K, H, W) more spike frames, 0 or 1, K >= 0 -> the frames that they complete (perhaps none)."""
@@ -188,32 +172,32 @@ class OnlineDnSS:
         Returns:
             As `push`; arrays where `packed` is an array.
         """
-        if self._device is None:
+        if self.device is None:
             return self.push(unpack_frames(np.asarray(packed), shape))
-        return self._pushed(unpacked_on(packed, shape, self._device), as_tensors=isinstance(packed, torch.Tensor))
+        return self._pushed(unpacked_on(packed, shape, self.device), as_tensors=isinstance(packed, torch.Tensor))
 
     def _pushed(self, spikes: ArrayLike | torch.Tensor, *, as_tensors: bool) -> Denoised:
         if self._ended:
             raise NotReadyError("the stream has ended (flush was called); call reset() to begin another")
         chunk = self._checked(spikes)
-        self._as_tensors = self._device is not None and as_tensors
-        if not self._chains:
+        self._as_tensors = self.device is not None and as_tensors
+        if not self._passes:
             self._begin((chunk.shape[1], chunk.shape[2]))
-        return self._denoise([chain.push(chunk) for chain in self._chains])
+        return self._denoise([passes.push(chunk[None])[0] for passes in self._passes])
 
     def flush(self) -> Denoised:
         """End the stream -> its last frames, so that output and input have as many."""
-        if not self._chains:
+        if not self._passes:
             raise NotReadyError("nothing was pushed yet; push spike frames first")
         self._ended = True
-        return self._denoise([chain.end() for chain in self._chains])
+        return self._denoise([passes.end()[0] for passes in self._passes])
 
     def state(self) -> dict[str, Any]:
         """A copy of everything on which later frames depend, but the weights: plain arrays and numbers, picklable."""
         state: dict[str, Any] = {"of": self._identity(), "shape": self.shape}
-        if self._chains:
+        if self._passes:
             state |= {
-                "chains": [chain.state() for chain in self._chains],
+                "chains": [passes.state() for passes in self._passes],
                 "mixing": None if self._mixing is None else self._mixing.state(),
                 "decoding": copy.deepcopy(self._decoding),
                 "ended": self._ended,
@@ -246,43 +230,19 @@ class OnlineDnSS:
                 f"the state is no whole state of a denoiser ({type(error).__name__}: {error}); "
                 "give the result of `OnlineDnSS.state()`"
             ) from error
-        self._chains, self._mixing = other._chains, other._mixing
+        self._passes, self._mixing = other._passes, other._mixing
         self._decoding, self._ended = other._decoding, other._ended
 
-    def chain(self, shape: tuple[int, int], first: int = 0) -> PassChain:
-        """Passes of this network over another stream from frame `first` on, for a caller that denoises many."""
-        self._check_map(shape)
-        options: dict[str, Any] = {"unit": self._unit, "stride": self._stride, "first": first}
-        return PassChain(self._recipe, self._network, self._type, shape, **options)
-
-    def streams_on_device(self, streams: int, shape: tuple[int, int]) -> DeviceStreams:
-        """Passes of this network over other streams, on the device."""
-        self._check_map(shape)
-        assert self._device is not None
-        options: dict[str, Any] = {"unit": self._unit, "replays": self._engine == "captured"}
-        return DeviceStreams(self._recipe, self._network, self._type, shape, streams, self._device, **options)
-
-    def _check_map(self, shape: tuple[int, int]) -> None:
-        if self._unit is not None and self._unit.gain.shape != shape:
-            raise InputError(f"the calibration map has shape {self._unit.gain.shape}, the stream's frames {shape}")
-
-    def passes(self, windows: list[PassWindow], carried: list[infer.Carried]) -> list[tuple[Rates, infer.Carried]]:
-        """Rates of the windows of as many streams, and the carried arrays of each, in one pass of the network."""
-        return infer.rates_of_many(self._network, windows, self._type, carried)
-
     def _begin(self, shape: tuple[int, int]) -> None:
-        firsts = (0, self._recipe.layout.planes // 2) if self._overlap else (0,)
-        self._chains = [self._own_chain(shape, first) for first in firsts]
-        self._mixing = Crossfade(self._recipe.layout.planes, shape) if self._overlap else None
+        planes = self.engine.recipe.layout.planes
+        firsts = (0, planes // 2) if self._overlap else (0,)
+        self._passes = [self.engine.passes(shape, first=first) for first in firsts]
+        self._mixing = Crossfade(planes, shape) if self._overlap else None
         self._decoding = _DECODERS[self._decoder].start(shape)
 
-    def _own_chain(self, shape: tuple[int, int], first: int) -> PassChain | DeviceChain:
-        chain = self.chain(shape, first)
-        return chain if self._device is None else DeviceChain(self.streams_on_device(1, shape), chain, first)
-
     def _go_on(self, state: dict[str, Any]) -> None:
-        for chain, its in zip(self._chains, state["chains"], strict=True):
-            chain.restore(its)
+        for passes, its in zip(self._passes, state["chains"], strict=True):
+            passes.restore(its)
         if self._mixing is not None:
             self._mixing.restore(state["mixing"])
         for found, ours in zip(state["decoding"], self._decoding, strict=True):
@@ -292,34 +252,26 @@ class OnlineDnSS:
 
     def _identity(self) -> dict[str, Any]:
         """The options and weights on which frames depend besides the stream."""
-        precision = "bfloat16" if self._type == torch.bfloat16 else "float32"
-        return {
-            "recipe and weights": self._digest,
-            "stride": self._stride,
-            "precision": precision,
-            "engine": self._engine if self._device is None else f"{self._engine} on {self._device.type}",
-            "decoder": self._decoder,
-            "overlap": self._overlap,
-            "calibration map": None if self._unit is None else self._unit.digest,
-        }
+        own = {"recipe and weights": self._digest, "decoder": self._decoder, "overlap": self._overlap}
+        return own | self.engine.identity()
 
-    def _denoise(self, passes: list[Iterator[tuple[int, Any]]]) -> Denoised:
-        """The frames that these passes, by chain, complete."""
-        if self._device is None:
-            return self._denoised(passes)
+    def _denoise(self, done: list[list[tuple[int, Any]]]) -> Denoised:
+        """The frames that these passes complete."""
+        device, shape = self.device, self._passes[0].shape
+        if device is None:
+            return self._decoded(done, shape)
         if self._as_tensors and self.output == "rate" and not self._overlap:
-            nothing = torch.empty((0, *self._chains[0].shape), device=self._device)
-            return torch.cat([nothing, *(rate for _, rate in passes[0])])  # type: ignore[return-value]
-        done = self._denoised([kept(rates) for rates in passes])
+            nothing = torch.empty((0, *shape), device=device)
+            return torch.cat([nothing, *(rate for _, rate in done[0])])  # type: ignore[return-value]
+        frames = self._decoded([[(at, on_host(rate)) for at, rate in passes] for passes in done], shape)
         if not self._as_tensors:
-            return done
-        parts = [torch.from_numpy(part).to(self._device) for part in (done if isinstance(done, tuple) else (done,))]
-        return tuple(parts) if isinstance(done, tuple) else parts[0]  # type: ignore[return-value]
+            return frames
+        parts = [torch.from_numpy(part).to(device) for part in (frames if isinstance(frames, tuple) else (frames,))]
+        return tuple(parts) if isinstance(frames, tuple) else parts[0]  # type: ignore[return-value]
 
-    def _denoised(self, passes: list[Iterator[tuple[int, Rates]]]) -> Denoised:
-        shape = self._chains[0].shape
+    def _decoded(self, done: list[list[tuple[int, Pictures]]], shape: tuple[int, int]) -> Denoised:
         rates, spikes = [np.empty((0, *shape), np.float32)], [np.empty((0, *shape), np.uint8)]
-        for rate in self._mixed(passes):
+        for rate in self._mixed(done):
             fired, self._decoding = _DECODERS[self._decoder].step(rate, self._decoding)
             rates.append(rate)
             spikes.append(fired)
@@ -327,36 +279,26 @@ class OnlineDnSS:
             return np.concatenate(spikes)
         return np.concatenate(rates) if self.output == "rate" else (np.concatenate(spikes), np.concatenate(rates))
 
-    def _mixed(self, passes: list[Iterator[tuple[int, Rates]]]) -> Iterator[Rates]:
+    def _mixed(self, done: list[list[tuple[int, Pictures]]]) -> list[Pictures]:
         if self._mixing is None:
-            yield from (rate for _, rate in passes[0])
-            return
-        for start, rate in chain_of(*passes):
+            return [rate for _, rate in done[0]]
+        for start, rate in chain_of(*done):
             self._mixing.add(start, rate)
-        yield self._mixing.take(min(chain.covered for chain in self._chains))
+        return [self._mixing.take(min(passes.covered for passes in self._passes))]
 
     def _checked(self, spikes: ArrayLike | torch.Tensor) -> Any:
         """The frames as an array, or as a tensor on the device."""
-        chunk: Any = as_spikes(spikes) if self._device is None else spikes_on(spikes, self._device)
+        chunk: Any = as_spikes(spikes) if self.device is None else spikes_on(spikes, self.device)
         if min(chunk.shape[1:]) < 1:
             raise InputError(
                 f"spikes have shape {tuple(chunk.shape)}; frames must have at least one row and one column"
             )
-        if self._chains and tuple(chunk.shape[1:]) != self.shape:
+        if self._passes and tuple(chunk.shape[1:]) != self.shape:
             raise InputError(
                 f"spikes have frames of {tuple(chunk.shape[1:])}, the stream has {self.shape}; "
                 "call reset() to begin a stream of another size"
             )
         return chunk
-
-
-def _moved(network: nn.Module, device: torch.device) -> nn.Module:
-    if not has_passes(network):
-        raise InputError(
-            f"a device takes networks of many planes a pass, as mode 'best' is, and no {type(network).__name__}; "
-            "leave device out"
-        )
-    return network.to(device)
 
 
 def _checked_output(output: str) -> str:

@@ -25,9 +25,8 @@ from numpy.typing import NDArray
 
 from denoiser.live.past import Past
 from denoiser.live.ring import Ring
-from denoiser.online import OnlineDnSS
-from denoiser.passes import infer
-from denoiser.passes.pixel_map import PixelMap
+from denoiser.passes.engine import Engine
+from denoiser.passes.infer import Carried
 from denoiser.passes.window import PassWindow, RollingWindow
 from denoiser.weights import load_weights
 from spikecam_env.checked import checked_count, checked_shape, checked_whole
@@ -73,8 +72,8 @@ class LiveDnSS:
         recipe, network, _ = load_weights(mode)
         self.shape = checked_shape(shape)
         self._layout = recipe.layout
-        self._online = OnlineDnSS(recipe, network, output="rate", **options)
-        self._unit = _map(options.get("unit"), self.shape)
+        self._engine = Engine.of(recipe, network, **options)
+        self._engine.check_map(self.shape)
         self._passes = checked_count(passes, "passes")
         middle = self._layout.planes // 2
         self._plane = middle if plane is None else checked_whole(plane, "plane", 0, self._layout.planes - 1)
@@ -120,7 +119,7 @@ class LiveDnSS:
         """(planes, H, W) [spikes/frame], all frames of the last pass."""
         self._past: Past | None = None
         self._sums = np.zeros((2, *self.shape), np.float32)
-        self._carried: infer.Carried = ()
+        self._carried: Carried = ()
 
     def warm_up(self) -> None:
         """Do the slow work of the first pictures now, such as to compile; forgets the stream."""
@@ -190,7 +189,7 @@ class LiveDnSS:
             self._past = None
             return False
         self._past, zero = past, max(past.first, first - _LONG)
-        rolling = RollingWindow(self._layout, self.shape, self._unit)
+        rolling = RollingWindow(self._layout, self.shape, self._engine.unit)
         rolling.restore(
             {
                 "start": start - zero,
@@ -203,7 +202,7 @@ class LiveDnSS:
             }
         )
         window = next(rolling.push(spikes[:0]))
-        ((self.rates, self._carried),) = self._online.passes([window], [self._carried])
+        ((self.rates, self._carried),) = self._engine.run([window], [self._carried])
         rolling.learn(window, self.rates)
         self._sums = rolling.state()["sums"]
         self.window = replace(window, start=start)
@@ -216,12 +215,3 @@ class LiveDnSS:
             return past
         pixels = self.shape[0] * self.shape[1]
         return Past.nothing(max(origin, first - HISTORY), pixels, len(self._shares))
-
-
-def _map(unit: Any, shape: tuple[int, int]) -> PixelMap | None:
-    if unit is None:
-        return None
-    found = PixelMap.of(unit)
-    if found.gain.shape != shape:
-        raise InputError(f"the calibration map has shape {found.gain.shape}, the stream's frames {shape}")
-    return found

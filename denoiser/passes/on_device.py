@@ -2,65 +2,57 @@
 
     frames -> windows (`denoiser.passes.window_torch`) -> network -> rates
 
-The law is that of `chain.py`, to the rounding of sums: rates differ by less than 1e-5 in float32.  The last
-passes of a stream, over mirrored frames, are made on the host by `PassChain`, with the network where it is.
+The law is that of `on_host.py`, to the rounding of sums: rates differ by less than 1e-5 in float32.  The last passes
+of a stream, over mirrored frames, are made by `HostPasses`, with the network where it is.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import torch
 from numpy.typing import ArrayLike, NDArray
-from torch import Tensor, nn
+from torch import Tensor
 
 from denoiser.ground.captured import captured
 from denoiser.ground.number_type import computing_in
 from denoiser.ground.torch_threads import where_torch_can
 from denoiser.passes import infer
-from denoiser.passes.chain import PassChain, Rates
-from denoiser.passes.pixel_map import PixelMap
-from denoiser.passes.recipe import Recipe
+from denoiser.passes.on_host import HostPasses
 from denoiser.passes.window_torch import StreamWindows, learned, pushed
 from spikecam_env.errors import InputError
 from spikecam_env.streams.packing import as_spikes
 
+if TYPE_CHECKING:
+    from denoiser.passes.engine import Engine
 
-class DeviceStreams:
-    """N streams of frames of one shape before one network of many planes a pass.  Streams begin anew one by one.
+
+class DevicePasses:
+    """Passes over N streams of frames of one shape, by a network of many planes a pass.  Streams begin anew one by one.
 
     Args:
-        recipe: of the network.
-        network: on the device, as `infer.prepared` makes it.
-        number_type: in which it computes.
+        engine: the network, on the device.
+        device: of windows and network.
         shape: (rows, columns).
         streams: N.
-        device: of windows and network.
-        unit: calibration map.
-        replays: on CUDA, a pass of all streams is recorded once and replayed.
+        first: frame of every stream from which on there are passes.
 
     Raises:
-        InputError: the network has one plane a pass, or the layout is one that `StreamWindows` cannot begin.
+        InputError: the network has one plane a pass, the layout is one that `StreamWindows` cannot begin, or the
+            calibration map has another shape.
     """
 
     def __init__(
-        self,
-        recipe: Recipe,
-        network: nn.Module,
-        number_type: torch.dtype,
-        shape: tuple[int, int],
-        streams: int,
-        device: torch.device,
-        *,
-        unit: PixelMap | None = None,
-        replays: bool = False,
+        self, engine: Engine, device: torch.device, shape: tuple[int, int], streams: int = 1, first: int = 0
     ) -> None:
+        recipe = engine.recipe
         if recipe.layout.planes == 1:
             raise InputError("a device takes networks of many planes a pass, as mode 'best' is; leave device out")
-        self.layout, self.shape, self.device = recipe.layout, shape, device
-        self._network, self._type, self._unit = network, number_type, unit
+        self._engine, self.layout, self.shape, self.device = engine, recipe.layout, shape, device
+        engine.check_map(shape)
+        self._ending: HostPasses | None = None  # makes the last passes of the streams
+        self._first, self._skipped = first, 0
         self._windows = StreamWindows.begin(self.layout, streams, shape, device)
         self._calibrate()
         self._carried = tuple(torch.zeros((streams, *size), device=device) for size in recipe.carries(shape))
@@ -70,7 +62,7 @@ class DeviceStreams:
         self._waits = np.zeros(streams, np.int64)  # frames of `_waiting` that are some
         self.passes = np.zeros(streams, np.int64)
         """(N,) passes of each, with the one that covers the frames before the first."""
-        self._together = self._recorded() if replays else self._all_on
+        self._together = self._recorded() if engine.kind == "captured" else self._all_on
 
     def __len__(self) -> int:
         return len(self._waits)
@@ -80,13 +72,52 @@ class DeviceStreams:
         self._begins |= torch.from_numpy(which).to(self.device)
         self._waits[which], self.passes[which] = 0, 0
 
-    def push(self, new: Tensor) -> list[Tensor]:
-        """(N, K, H, W) uint8 more frames, on the device -> N times the rates (F, H, W) float32 they complete, there."""
-        return where_torch_can(lambda: self._pushed(new))
+    @property
+    def covered(self) -> int:
+        """Frames of every stream up to which passes are done."""
+        if self._ending is not None:
+            return self._ending.covered
+        return self._first + max(int(self.passes.min()) - 1, 0) * self.layout.planes
+
+    def exchange(self, which: NDArray[np.bool_], others: Any) -> None:
+        """InputError, where `HostPasses` exchange streams."""
+        raise InputError("streams on a device lie in one memory and cannot be exchanged; leave device out")
+
+    def push(self, new: Tensor) -> list[list[tuple[int, Tensor]]]:
+        """(N, K, H, W) uint8 more frames, on the device -> of each stream the passes they complete: first frame, and
+        rates (planes, H, W) float32, there."""
+        skip = min(self._first - self._skipped, new.shape[1])
+        self._skipped += skip
+        return where_torch_can(lambda: self._pushed(new[:, skip:]))
+
+    def end(self) -> list[list[tuple[int, Tensor]]]:
+        """The streams are over -> the passes that are left."""
+        ending = HostPasses(self._engine, self.shape, len(self), self._first)
+        for stream in range(len(self)):
+            ending.restore(self.state(stream), stream)
+        self._ending = ending
+        return [[(at, torch.from_numpy(rates).to(self.device)) for at, rates in its] for its in ending.end()]
+
+    def state(self, stream: int = 0) -> dict[str, Any]:
+        """Everything on which later passes of a stream depend, as `HostPasses.state` has it."""
+        if self._ending is not None:
+            return self._ending.state(stream)
+        window, carried = self._window_state(stream)
+        return {"window": window, "held": None, "carried": carried, "skipped": self._skipped}
+
+    def restore(self, state: dict[str, Any]) -> None:
+        """The one stream goes on from `state()`; InputError for arrays of another size or type."""
+        ending, window = HostPasses(self._engine, self.shape, 1, self._first), state["window"]
+        ending.restore(state)
+        self._skipped = int(state["skipped"])
+        is_over = 0 < window["start"] > window["seen"] - self.layout.future
+        self._ending = ending if is_over else None
+        if not is_over:
+            self._go_on(window, tuple(state["carried"]))
 
     @torch.inference_mode()
-    def _pushed(self, new: Tensor) -> list[Tensor]:
-        done: list[list[Tensor]] = [[torch.empty((0, *self.shape), device=self.device)] for _ in range(len(self))]
+    def _pushed(self, new: Tensor) -> list[list[tuple[int, Tensor]]]:
+        done: list[list[tuple[int, Tensor]]] = [[] for _ in range(len(self))]
         planes, waits = self.layout.planes, self._waits.copy()
         for count in np.unique(waits).tolist():
             numbers = np.flatnonzero(waits == count)
@@ -96,11 +127,11 @@ class DeviceStreams:
                 rates = self._passed(rows, numbers, frames[:, first : first + planes])
                 for number, its in zip(numbers.tolist(), rates, strict=True):
                     if self.passes[number] > 1:
-                        done[number].append(its)
+                        done[number].append((self._first + (int(self.passes[number]) - 2) * planes, its))
             left = frames.shape[1] % planes
             self._waiting[rows, :left] = frames[:, frames.shape[1] - left :]
             self._waits[numbers] = left
-        return [torch.cat(rates) for rates in done]
+        return done
 
     def _passed(self, rows: Any, numbers: NDArray[np.int64], new: Tensor) -> Tensor:
         """Rates (n, planes, H, W) of the next pass of some streams; of a first pass they mean nothing."""
@@ -118,9 +149,9 @@ class DeviceStreams:
         windows, planes = pushed(self.layout, self._windows.rows(rows), new, self._begins[rows])
         goes_on = (windows.start > 0)[:, None, None, None]
         carried = tuple(torch.where(goes_on, before[rows], 0.0) for before in self._carried)
-        spikes = windows.frames.to(self._type).contiguous(memory_format=torch.channels_last)
-        with computing_in(self._type, self.device):
-            found, left = self._network(spikes, planes, carried)
+        spikes = windows.frames.to(self._engine.type).contiguous(memory_format=torch.channels_last)
+        with computing_in(self._engine.type, self.device):
+            found, left = self._engine.network(spikes, planes, carried)
         rates: Tensor = found.float().clamp(0.0, 1.0)
         self._windows.put(rows, learned(self.layout, windows, rates))
         for before, now in zip(self._carried, left, strict=True):
@@ -136,7 +167,7 @@ class DeviceStreams:
         return replay
 
     @torch.inference_mode()
-    def window_state(self, stream: int) -> tuple[dict[str, Any], infer.Carried]:
+    def _window_state(self, stream: int) -> tuple[dict[str, Any], infer.Carried]:
         """The state of a stream's window, as of `RollingWindow.state`, and the arrays that its last pass left."""
         layout, passes, waits = self.layout, int(self.passes[stream]), int(self._waits[stream])
         start = max(passes - 1, 0) * layout.planes  # of the next pass
@@ -153,7 +184,7 @@ class DeviceStreams:
         return state | {"start": start, "seen": seen, "averaged": seen - waits}, carried
 
     @torch.inference_mode()
-    def go_on(self, state: dict[str, Any], carried: infer.Carried) -> None:
+    def _go_on(self, state: dict[str, Any], carried: infer.Carried) -> None:
         """The one stream goes on from a state of its window, that of a `RollingWindow` too."""
         layout, start = self.layout, int(state["start"])
         self.restart(np.ones(1, bool))
@@ -177,67 +208,13 @@ class DeviceStreams:
         self._waits[:], self.passes[:] = waits, start // layout.planes + 1
 
     def _calibrate(self) -> None:
-        if self._unit is not None:
-            self._windows.gain[:] = torch.from_numpy(self._unit.gain).to(self.device)
-            self._windows.dark[:] = torch.from_numpy(self._unit.dark).to(self.device)
+        if (unit := self._engine.unit) is not None:
+            self._windows.gain[:] = torch.from_numpy(unit.gain).to(self.device)
+            self._windows.dark[:] = torch.from_numpy(unit.dark).to(self.device)
             self._windows.mapped.fill_(1.0)
 
     def _frames(self, streams: int, count: int) -> Tensor:
         return torch.zeros((streams, count, *self.shape), dtype=torch.uint8, device=self.device)
-
-
-class DeviceChain:
-    """A `PassChain` on a device: rates are tensors there.
-
-    Args:
-        streams: one.
-        host: a chain with the same network, for the state's form and a stream's last passes.
-        first: frame of the stream from which on there are passes.
-    """
-
-    def __init__(self, streams: DeviceStreams, host: PassChain, first: int = 0) -> None:
-        self._streams, self._host = streams, host
-        self._first, self._skipped = first, 0
-        self._over = False  # the host goes on
-        self.shape = streams.shape
-
-    @property
-    def covered(self) -> int:
-        """Frames of the stream up to which passes are done."""
-        if self._over:
-            return self._host.covered
-        return self._first + max(int(self._streams.passes[0]) - 1, 0) * self._streams.layout.planes
-
-    def push(self, chunk: Tensor) -> Iterator[tuple[int, Tensor]]:
-        """(K, H, W) more frames, on the device -> first frame and rates (F, H, W) of the passes they complete."""
-        skip = min(self._first - self._skipped, len(chunk))
-        self._skipped += skip
-        begin = self.covered
-        rates = self._streams.push(chunk[None, skip:])[0]
-        planes = self._streams.layout.planes
-        yield from ((begin + at, rates[at : at + planes]) for at in range(0, len(rates), planes))
-
-    def end(self) -> Iterator[tuple[int, Tensor]]:
-        """The stream is over -> the passes that are left."""
-        self._host.restore(self.state())
-        self._over = True
-        for start, rates in self._host.end():
-            yield start, torch.from_numpy(rates).to(self._streams.device)
-
-    def state(self) -> dict[str, Any]:
-        """Everything on which later passes depend, as `PassChain.state` has it."""
-        if self._over:
-            return self._host.state()
-        window, carried = self._streams.window_state(0)
-        return {"window": window, "held": None, "carried": carried, "skipped": self._skipped}
-
-    def restore(self, state: dict[str, Any]) -> None:
-        """Go on from `state()`; InputError for arrays of another size or type."""
-        self._host.restore(state)
-        self._skipped, window = int(state["skipped"]), state["window"]
-        self._over = 0 < window["start"] > window["seen"] - self._streams.layout.future
-        if not self._over:
-            self._streams.go_on(window, self._host.carried)
 
 
 def spikes_on(spikes: ArrayLike | Tensor, device: torch.device) -> Tensor:
@@ -284,8 +261,3 @@ def unpacked_on(packed: NDArray[np.uint8] | Tensor, shape: tuple[int, int], devi
         )
     bits = (rows[..., None] >> torch.arange(8, dtype=torch.uint8, device=device)) & 1
     return bits.reshape(len(rows), -1)[:, :pixels].reshape(-1, *shape)
-
-
-def kept(rates: Iterator[tuple[int, Tensor]]) -> Iterator[tuple[int, Rates]]:
-    """The same rates on the host."""
-    return ((start, infer.on_host(rate)) for start, rate in rates)

@@ -9,10 +9,9 @@ import numpy as np
 import pytest
 import torch
 
-from denoiser.ground.number_type import number_type
 from denoiser.online import OnlineDnSS, denoise
 from denoiser.passes import infer
-from denoiser.passes.chain import PassChain
+from denoiser.passes.engine import Engine
 from denoiser.passes.recipe import RECIPES
 from denoiser.passes.window import RollingWindow
 from spikecam_env.errors import InputError, NotReadyError
@@ -341,23 +340,15 @@ def test_overlapping_passes_are_the_mean_of_two_chains():
     alone = run(denoiser("best"), [spikes])[1]
     recipe = RECIPES["best"]
     torch.manual_seed(1)
-    network = infer.prepared(recipe.network(), number_type("auto"))
-    later = np.concatenate(
-        [
-            alone[:8],
-            *(rates for _, rates in _passes(PassChain(recipe, network, number_type("auto"), SHAPE, first=8), spikes)),
-        ]
-    )
+    passes = Engine.of(recipe, recipe.network()).passes(SHAPE, first=8)
+    ((*done,), (*last,)) = passes.push(spikes[None])[0], passes.end()[0]
+    later = np.concatenate([alone[:8], *(rates for _, rates in [*done, *last])])
     place = np.arange(90) % 16 + 0.5
     weight = np.minimum(place, 16 - place)[:, None, None]
     other = np.where(np.arange(90)[:, None, None] < 8, 0.0, 8 - weight)
     assert np.allclose(mixed, (weight * alone + other * later) / (weight + other), atol=1e-6)
     assert np.abs(later - alone)[8:].max() > 1e-4
     assert np.array_equal(later[8:], run(denoiser("best"), [spikes[8:]])[1])  # the chain begins anew there
-
-
-def _passes(chain, spikes):
-    return [*chain.push(spikes), *chain.end()]
 
 
 def test_a_map_of_another_size_and_a_mode_without_one_are_refused():

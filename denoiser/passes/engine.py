@@ -1,0 +1,113 @@
+"""A network made ready for passes: its copy in the numbers and at the place in which it computes, and its options."""
+
+from __future__ import annotations
+
+import os
+from dataclasses import dataclass
+from typing import Any
+
+import torch
+from numpy.typing import ArrayLike
+from torch import nn
+
+from denoiser.ground.number_type import PRECISIONS, number_type
+from denoiser.passes import infer
+from denoiser.passes.given_network import check_network, has_passes
+from denoiser.passes.on_device import DevicePasses
+from denoiser.passes.on_host import HostPasses
+from denoiser.passes.pixel_map import PixelMap
+from denoiser.passes.recipe import Recipe
+from denoiser.passes.window import PassWindow
+from spikecam_env.calibration import Calibration
+from spikecam_env.checked import checked_count
+from spikecam_env.errors import InputError, unknown_name
+from spikecam_env.sensor.kernels.cuda import checked_device
+from spikecam_env.types import Pictures
+
+ENGINES = ("torch", "captured")
+
+
+@dataclass(frozen=True)
+class Engine:
+    """A network, and how it is run."""
+
+    recipe: Recipe
+    network: nn.Module
+    """As `infer.prepared` makes it, on the device."""
+    type: torch.dtype
+    """In which it computes."""
+    kind: str = "torch"
+    """Of `ENGINES`; "captured": on CUDA, a pass of all streams is recorded once and replayed."""
+    stride: int = 1
+    """Frames from one evaluation of the network to the next; its plane is held in between."""
+    unit: PixelMap | None = None
+    """The calibration map."""
+    device: torch.device | None = None
+    """Of windows, planes and network; None: on the processor, in compiled code."""
+
+    @classmethod
+    def of(
+        cls,
+        recipe: Recipe,
+        network: nn.Module,
+        *,
+        precision: str = "auto",
+        kind: str = "torch",
+        stride: int = 1,
+        unit: PixelMap | Calibration | tuple[ArrayLike, ArrayLike] | str | os.PathLike[str] | None = None,
+        device: str | torch.device | None = None,
+    ) -> Engine:
+        """A copy of a network, with the options of `OnlineDnSS`; InputError for those that do not fit it."""
+        check_network(recipe, network)
+        if not isinstance(precision, str) or precision not in PRECISIONS:
+            raise unknown_name("precision", precision, PRECISIONS)
+        if kind == "openvino":
+            raise InputError("engine 'openvino' was removed: it was 1.06 times as fast as 'torch'; take 'torch'")
+        if not isinstance(kind, str) or kind not in ENGINES:
+            raise unknown_name("engine", kind, ENGINES)
+        if checked_count(stride, "stride") > 1 and recipe.layout.planes > 1:
+            raise InputError(f"stride is {stride}; it must be 1 for a network of many planes a pass")
+        if unit is not None and not recipe.layout.gain_memory:
+            raise InputError("this network takes no calibration map; leave unit out, or use mode 'best'")
+        unit = None if unit is None else PixelMap.of(unit)
+        place = None if device is None else checked_device(device, "leave device out")
+        if kind == "captured" and place is None:
+            raise InputError("engine 'captured' replays passes on a device; give one, device='cuda', or take 'torch'")
+        its_type = number_type(precision, place)
+        network = infer.prepared(network, its_type)
+        if place is not None:
+            network = _moved(network, place)
+        return cls(recipe, network, its_type, kind, int(stride), unit, place)
+
+    def passes(self, shape: tuple[int, int], streams: int = 1, first: int = 0) -> HostPasses | DevicePasses:
+        """Passes over streams of frames of `shape`, from frame `first` of each on."""
+        if self.device is None:
+            return HostPasses(self, shape, streams, first)
+        return DevicePasses(self, self.device, shape, streams, first)
+
+    def run(self, windows: list[PassWindow], carried: list[infer.Carried]) -> list[tuple[Pictures, infer.Carried]]:
+        """Rates of the windows of as many streams, and the carried arrays of each, in one pass of the network."""
+        return infer.rates_of_many(self.network, windows, self.type, carried)
+
+    def check_map(self, shape: tuple[int, int]) -> None:
+        """InputError where the calibration map has another shape."""
+        if self.unit is not None and self.unit.gain.shape != shape:
+            raise InputError(f"the calibration map has shape {self.unit.gain.shape}, the stream's frames {shape}")
+
+    def identity(self) -> dict[str, Any]:
+        """The options on which rates depend."""
+        return {
+            "stride": self.stride,
+            "precision": "bfloat16" if self.type == torch.bfloat16 else "float32",
+            "engine": self.kind if self.device is None else f"{self.kind} on {self.device.type}",
+            "calibration map": None if self.unit is None else self.unit.digest,
+        }
+
+
+def _moved(network: nn.Module, device: torch.device) -> nn.Module:
+    if not has_passes(network):
+        raise InputError(
+            f"a device takes networks of many planes a pass, as mode 'best' is, and no {type(network).__name__}; "
+            "leave device out"
+        )
+    return network.to(device)
