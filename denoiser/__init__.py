@@ -11,6 +11,7 @@ old_modules(
         "metrics": "evaluate.metrics",
         "mus": "decoders.mus",
         "niqe": "evaluate.niqe",
+        "reconstruct.weights": "weights",
         "reconstruct.spk2imgnet": "networks.spk2imgnet",
         "run": "training.resumable_run",
         "train": "training.train_denoiser",

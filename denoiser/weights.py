@@ -2,7 +2,8 @@
 
 A file is `torch.save` of plain values: format, mode, recipe, state_dict, training (command, seed, steps, minutes,
 package version) and sha256, the digest of recipe and weights.  A foreign file cannot run code (`plain_torch.py`).
-`seal` adds the digest to a file without one.
+`seal` adds the digest to a file without one.  The file of a reconstructor has `name` in place of `mode`, and its
+weights are float16 (they compute in float32).
 """
 
 from __future__ import annotations
@@ -12,42 +13,39 @@ import io
 import json
 import os
 import warnings
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Collection, Mapping
 from importlib import resources
 from pathlib import Path
-from typing import Any, Protocol, TypeVar
+from typing import Any, TypeAlias, TypeVar
 
 import torch
 from torch import Tensor, nn
 
 from denoiser.ground.plain_torch import read_plain, tensors_like
 from denoiser.ground.torch_threads import where_torch_can
+from denoiser.networks.reconstructor_recipe import LEARNED, ReconstructorRecipe
 from denoiser.passes.recipe import RECIPES, Recipe
 from spikecam_env.errors import InputError, shown, unknown_name
 from spikecam_env.whole import whole_file
 
 FORMAT = "spikecam-denoiser/1"
+RECONSTRUCTOR_FORMAT = "spikecam-reconstructor/1"
 
-
-class Described(Protocol):
-    """A recipe of any kind of network."""
-
-    def network(self) -> nn.Module:
-        """The untrained network."""
-
-    def to_dict(self) -> dict[str, Any]:
-        """The recipe as plain values."""
-
-
-R = TypeVar("R", bound=Described)
+AnyRecipe: TypeAlias = Recipe | ReconstructorRecipe
+R = TypeVar("R", Recipe, ReconstructorRecipe)
 
 
 def save_weights(
-    path: str | os.PathLike[str], mode: str, recipe: Recipe, network: nn.Module, training: dict[str, Any]
+    path: str | os.PathLike[str], mode: str, recipe: AnyRecipe, network: nn.Module, training: dict[str, Any]
 ) -> None:
-    """Write a checkpoint; the file appears whole."""
+    """Write a checkpoint of a denoiser or a reconstructor; the file appears whole."""
     state = {name: tensor.detach().cpu().contiguous() for name, tensor in network.state_dict().items()}
-    data = {"format": FORMAT, "mode": mode, "recipe": recipe.to_dict(), "state_dict": state, "training": training}
+    if isinstance(recipe, Recipe):
+        names = {"format": FORMAT, "mode": mode}
+    else:
+        names = {"format": RECONSTRUCTOR_FORMAT, "name": mode}
+        state = {name: tensor.to(torch.float16) for name, tensor in state.items()}
+    data = {**names, "recipe": recipe.to_dict(), "state_dict": state, "training": training}
     write_whole(path, data | {"sha256": digest(recipe, state)})
 
 
@@ -67,7 +65,14 @@ def load_weights(path: str | os.PathLike[str]) -> tuple[Recipe, nn.Module, dict[
     return where_torch_can(lambda: read_checkpoint(weights_path(path), FORMAT, Recipe.from_dict))
 
 
-def digest(recipe: Described, weights: Mapping[str, Tensor]) -> str:
+def load_reconstructor(path: str | os.PathLike[str]) -> tuple[ReconstructorRecipe, nn.Module, dict[str, Any]]:
+    """Read a checkpoint of a reconstructor, as `load_weights` does; its weights become float32."""
+    return where_torch_can(
+        lambda: read_checkpoint(path, RECONSTRUCTOR_FORMAT, ReconstructorRecipe.from_dict, torch.float16)
+    )
+
+
+def digest(recipe: AnyRecipe, weights: Mapping[str, Tensor]) -> str:
     """SHA-256 of a recipe, and of weights by name."""
     found = hashlib.sha256(json.dumps(recipe.to_dict(), sort_keys=True).encode())
     for name in sorted(weights):
@@ -79,9 +84,18 @@ def digest(recipe: Described, weights: Mapping[str, Tensor]) -> str:
 
 def pretrained_path(mode: str) -> Path:
     """Where the shipped weights of a mode are."""
-    if not isinstance(mode, str) or mode not in RECIPES:
-        raise unknown_name("denoiser mode", mode, RECIPES)
-    return Path(str(resources.files("denoiser") / "weights" / f"{mode}.pt"))
+    return _shipped("denoiser mode", mode, RECIPES)
+
+
+def reconstructor_path(name: str) -> Path:
+    """Where the shipped weights of a learned reconstructor are."""
+    return _shipped("learned reconstructor", name, LEARNED)
+
+
+def _shipped(what: str, name: Any, known: Collection[str]) -> Path:
+    if not isinstance(name, str) or name not in known:
+        raise unknown_name(what, name, known)
+    return Path(str(resources.files("denoiser") / "weights" / f"{name}.pt"))
 
 
 def weights_path(weights: Any) -> Path:

@@ -26,7 +26,7 @@ from denoiser.ground.number_type import PRECISIONS, computing_in, number_type
 from denoiser.ground.torch_threads import where_torch_can
 from denoiser.networks.reconstructor_recipe import LEARNED
 from denoiser.networks.spk2imgnet import WINDOW
-from denoiser.reconstructor_weights import load_reconstructor, shipped_path
+from denoiser.weights import load_reconstructor, reconstructor_path
 from spikecam_env.checked import checked_whole
 from spikecam_env.errors import InputError, unknown_name
 from spikecam_env.streams import middleTFI, middleTFP
@@ -122,7 +122,7 @@ def _light(network: nn.Module, window: NDArray[np.uint8], kind: torch.dtype) -> 
 
 
 def _network(name: str, weights: str | os.PathLike[str] | None) -> nn.Module:
-    path = existing_file(shipped_path(name) if weights is None else Path(weights))
+    path = existing_file(reconstructor_path(name) if weights is None else Path(weights))
     found, network = _loaded(path, path.stat().st_mtime_ns)
     if found != LEARNED[name].architecture:
         raise InputError(

@@ -14,7 +14,6 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Protocol
@@ -22,25 +21,21 @@ from typing import Any, Protocol
 import torch
 from torch import Tensor, nn
 
-from denoiser.ground.captured import captured
 from denoiser.networks.dnss import DnSS
 from denoiser.networks.stream_network import StreamDnSS
 from denoiser.passes.recipe import Recipe, checked_channels, recipe_of
 from denoiser.training.interval_training import IntervalWindows
-from denoiser.training.resumable_run import Run
 from denoiser.training.rollout import Rollouts
 from denoiser.training.simulated import Bank, SimulatedStreams
 from denoiser.training.smaller import narrowed, without_refine
-from denoiser.training.training_loop import RUN_FILE, learn, save_progress
-from denoiser.training.training_options import TrainingOptions
-from denoiser.training.training_record import training_record
-from denoiser.weights import load_weights, save_weights
+from denoiser.training.training_loop import begun, learn, resumes
+from denoiser.training.training_options import VALIDATION_SEED, TrainingOptions
+from denoiser.weights import load_weights
 from spikecam_env.errors import InputError
 from spikecam_env.numbers import WholeRange
 from spikecam_env.run_folder import run_folder
 from spikecam_env.torch_settings import torch_settings
 
-VALIDATION_SEED = 1_000_003  # added to the seed: other scenes, other units, other textures of the same kinds
 VALIDATION_STREAMS = 8
 NARROWING_PASSES = 16
 """Passes of VALIDATION_STREAMS streams from which the channels of a larger network are chosen for a smaller one."""
@@ -104,15 +99,9 @@ def _trained(config: TrainConfig, progress: bool) -> Path:
     recipe = replace(recipe_of(config.mode), refine=config.refine)
     recipe = recipe if config.channels is None else replace(recipe, channels=config.channels)
     device = torch.device(config.device)
-    resumes = config.resume and (config.out / RUN_FILE).exists()
-    if config.start is None or resumes:
-        network = recipe.network()
-    else:
-        network = started(recipe, config.start, config.seed, config.patch)
-    run = Run.begin(network.to(device, memory_format=torch.channels_last))  # type: ignore[call-overload]
-    if resumes:
-        run.load(config.out / RUN_FILE)
-    torch.backends.cudnn.benchmark = True
+    is_new = config.start is None or resumes(config)
+    network = recipe.network() if is_new else started(recipe, str(config.start), config.seed, config.patch)
+    run = begun(config, network)
     taught = {} if config.teacher is None else {"teacher": _teacher(recipe, config.teacher).to(device)}
     streams = source(
         recipe,
@@ -128,9 +117,11 @@ def _trained(config: TrainConfig, progress: bool) -> Path:
     return learn(
         config,
         run,
-        lambda: stepper(run, streams, PASSES[recipe.target]),
+        recipe,
+        run.network,
+        lambda: streams.loss(run.network, PASSES[recipe.target]),
+        streams.streams,
         lambda: judge.scores(run.network),
-        lambda: _save(config, recipe, run),
         began=time.monotonic(),
         progress=progress,
     )
@@ -152,20 +143,6 @@ def source(recipe: Recipe, *, seed: int, **options: Any) -> TrainingSource:
     """Streams for a recipe: `Rollouts` for the light, `IntervalWindows` for the clean interval."""
     kind = IntervalWindows if recipe.target == "clean_inverse_interval" else Rollouts
     return kind(recipe.layout, seed=seed, **options)
-
-
-def stepper(run: Run, streams: TrainingSource, passes: int) -> Callable[[], Tensor]:
-    """A function that takes one step and returns its loss, which a GPU may still be computing."""
-
-    def step() -> Tensor:
-        run.optimiser.zero_grad(set_to_none=True)
-        loss = streams.loss(run.network, passes)
-        loss.backward()
-        nn.utils.clip_grad_norm_(run.network.parameters(), 1.0)
-        run.optimiser.step()
-        return loss.detach()
-
-    return captured(step, streams.streams.device, streams.streams.rng)
 
 
 class Validator:
@@ -225,11 +202,3 @@ def _teacher(recipe: Recipe, teacher: str) -> nn.Module:
     if found.layout != recipe.layout:
         raise InputError(f"teacher is {teacher!r}, weights of another mode; give a file of this mode")
     return network.to(memory_format=torch.channels_last).requires_grad_(False)  # type: ignore[call-overload, no-any-return]
-
-
-def _save(config: TrainConfig, recipe: Recipe, run: Run) -> Path:
-    weights = config.out / f"{config.mode}.pt"
-    record = training_record(config, run.step, run.seconds, run.resumed_at)
-    save_weights(weights, config.mode, recipe, run.network, record)
-    save_progress(config.out, run)
-    return weights

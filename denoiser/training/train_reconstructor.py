@@ -19,24 +19,19 @@ from pathlib import Path
 import torch
 from torch import Tensor, nn
 
-from denoiser.ground.captured import captured
 from denoiser.ground.number_type import computing_in, number_type
 from denoiser.networks import ssml
 from denoiser.networks.reconstructor_recipe import ReconstructorRecipe, reconstructor_recipe
 from denoiser.networks.spk2imgnet import WINDOW
-from denoiser.reconstructor_weights import save_reconstructor
 from denoiser.training.lessons import Lesson, LessonWindows, lesson_of
-from denoiser.training.resumable_run import Run
 from denoiser.training.rolling import RollingWindows
 from denoiser.training.simulated import UNIT_SHAPE, Bank, SimulatedStreams
-from denoiser.training.training_loop import RUN_FILE, learn, save_progress
-from denoiser.training.training_options import TrainingOptions
-from denoiser.training.training_record import training_record
+from denoiser.training.training_loop import begun, learn
+from denoiser.training.training_options import VALIDATION_SEED, TrainingOptions
 from spikecam_env.numbers import WholeRange
 from spikecam_env.run_folder import run_folder
 from spikecam_env.torch_settings import torch_settings
 
-VALIDATION_SEED = 1_000_003  # added to the seed: other scenes, other units, other textures of the same kinds
 VALIDATION_STREAMS = 64
 VALIDATION_MOMENTS = 4
 VALIDATION_TEXTURES, VALIDATION_UNITS = 32, 16
@@ -85,37 +80,30 @@ def train_reconstructor(config: ReconstructorConfig, *, progress: bool = True) -
 
 def _trained(config: ReconstructorConfig, progress: bool) -> Path:
     began = time.monotonic()
-    torch.backends.cudnn.benchmark = True
     lesson = lesson_of(config.recipe())
-    lesson.networks.to(config.device, memory_format=torch.channels_last)  # type: ignore[call-overload]
-    run = Run.begin(lesson.networks)
-    if config.resume and (config.out / RUN_FILE).exists():
-        run.load(config.out / RUN_FILE)
+    run = begun(config, lesson.networks)
     rolling = _windows(config, run.step, lesson.span)
     held_out = _held_out(config)
+    student = lesson.networks["student"]
     return learn(
         config,
         run,
-        lambda: captured(lambda: _step(config, lesson, run, rolling), rolling.streams.device, rolling.streams.rng),
-        lambda: validate(lesson.networks["student"], held_out),
-        lambda: _save(config, lesson, run),
+        config.recipe(),
+        student,
+        lambda: _loss(lesson, rolling.advance(config.frames_a_step)),
+        rolling.streams,
+        lambda: validate(student, held_out),
         began=began,
         progress=progress,
     )
 
 
-def _step(config: ReconstructorConfig, lesson: Lesson, run: Run, rolling: RollingWindows) -> Tensor:
-    """One step; its loss, which a GPU may still be computing."""
-    run.optimiser.zero_grad(set_to_none=True)
-    windows = rolling.advance(config.frames_a_step)
+def _loss(lesson: Lesson, windows: LessonWindows) -> Tensor:
+    """Mean of the streams whose windows are whole."""
     kind = number_type("auto", windows.spikes.device)
     with computing_in(kind, windows.spikes.device):
         losses = lesson.losses(windows, kind)
-    loss = (losses * windows.old).sum() / windows.old.sum().clamp(min=1)
-    loss.backward()
-    nn.utils.clip_grad_norm_(run.network.parameters(), 1.0)
-    run.optimiser.step()
-    return loss.detach()
+    return (losses * windows.old).sum() / windows.old.sum().clamp(min=1)
 
 
 def _windows(config: ReconstructorConfig, step: int, span: int) -> RollingWindows:
@@ -166,11 +154,3 @@ def validate(network: nn.Module, held_out: list[LessonWindows]) -> dict[str, flo
     network.train()
     count = sum(int(windows.old.sum()) for windows in held_out)
     return {name: round(-10 * math.log10(max(total, 1e-12) / max(count, 1)), 3) for name, total in sums.items()}
-
-
-def _save(config: ReconstructorConfig, lesson: Lesson, run: Run) -> Path:
-    weights = config.out / f"{config.mode}.pt"
-    record = training_record(config, run.step, run.seconds, run.resumed_at)
-    save_reconstructor(weights, config.mode, config.recipe(), lesson.networks["student"], record)
-    save_progress(config.out, run)
-    return weights

@@ -13,11 +13,15 @@ from collections.abc import Callable
 from pathlib import Path
 
 import torch
-from torch import Tensor
+from torch import Tensor, nn
 from tqdm import tqdm
 
+from denoiser.ground.captured import captured
 from denoiser.training.resumable_run import Run
+from denoiser.training.simulated import SimulatedStreams
 from denoiser.training.training_options import TrainingOptions
+from denoiser.training.training_record import training_record
+from denoiser.weights import AnyRecipe, save_weights
 from spikecam_env.whole import whole_file, write_text_whole
 
 WARM_UP_STEPS = 100
@@ -28,9 +32,11 @@ RUN_FILE = "last.pt"
 def learn(
     limits: TrainingOptions,
     run: Run,
-    step_of: Callable[[], Callable[[], Tensor]],
+    recipe: AnyRecipe,
+    network: nn.Module,
+    loss: Callable[[], Tensor],
+    streams: SimulatedStreams,
     validate: Callable[[], dict[str, float]],
-    save: Callable[[], Path],
     *,
     began: float,
     progress: bool,
@@ -40,18 +46,27 @@ def learn(
     Args:
         limits: options of the training.
         run: to go on with.
-        step_of: makes the step, a function that returns its loss; on a GPU a few steps are taken meanwhile
-            (`captured`).
+        recipe: of `network`.
+        network: of the run, whose weights are written.
+        loss: of the next step, with gradients.
+        streams: from which the loss follows.
         validate: scores by name, "network_db" among them.
-        save: writes all files.
         began: begin of this part of the run, by `time.monotonic`.
         progress: shows a bar.
     """
     before, saved = run.seconds, time.monotonic()
     bar = tqdm(total=limits.steps, initial=run.step, disable=not progress, mininterval=5.0, desc=limits.mode)
     losses: list[Tensor] = []
+    weights = limits.out / f"{limits.mode}.pt"
+
+    def save() -> Path:
+        record = training_record(limits, run.step, run.seconds, run.resumed_at)
+        save_weights(weights, limits.mode, recipe, network, record)
+        save_progress(limits.out, run)
+        return weights
+
     run.set_rate(rate_at(limits.lr, 0, 0.0))  # of the steps that come before a capture
-    step = step_of()
+    step = captured(lambda: _step(run, loss), streams.device, streams.rng)  # on a GPU a few steps are taken meanwhile
     while (done := share_done(limits, run)) < 1.0:
         run.set_rate(rate_at(limits.lr, run.step, done))
         losses.append(step())
@@ -60,15 +75,39 @@ def learn(
         bar.update()
         if run.step % limits.validate_every == 0:
             scores = validate()
-            loss = float(torch.stack(losses).mean())
-            run.curve.append({"step": run.step, "seconds": run.seconds, "loss": loss, **scores})
+            mean = float(torch.stack(losses).mean())
+            run.curve.append({"step": run.step, "seconds": run.seconds, "loss": mean, **scores})
             losses.clear()
-            bar.set_postfix(loss=loss, db=scores["network_db"])
+            bar.set_postfix(loss=mean, db=scores["network_db"])
         if run.step % limits.validate_every == 0 or time.monotonic() - saved > limits.save_every_s:
             save()
             saved = time.monotonic()
     bar.close()
     return save()
+
+
+def begun(limits: TrainingOptions, network: nn.Module) -> Run:
+    """A run before its first step, or the one that is in the folder, where that is to go on."""
+    run = Run.begin(network.to(limits.device, memory_format=torch.channels_last))  # type: ignore[call-overload]
+    if resumes(limits):
+        run.load(limits.out / RUN_FILE)
+    torch.backends.cudnn.benchmark = True
+    return run
+
+
+def resumes(limits: TrainingOptions) -> bool:
+    """Whether there is a run to go on with."""
+    return limits.resume and (limits.out / RUN_FILE).exists()
+
+
+def _step(run: Run, loss: Callable[[], Tensor]) -> Tensor:
+    """One step; its loss, which a GPU may still be computing."""
+    run.optimiser.zero_grad(set_to_none=True)
+    error = loss()
+    error.backward()
+    nn.utils.clip_grad_norm_(run.network.parameters(), 1.0)
+    run.optimiser.step()
+    return error.detach()
 
 
 def share_done(limits: TrainingOptions, run: Run) -> float:

@@ -12,6 +12,9 @@ from spikecam_env.errors import InputError
 from spikecam_env.numbers import Range, WholeRange
 from spikecam_env.sensor.kernels.cuda import checked_device
 
+VALIDATION_SEED = 1_000_003
+"""Added to the seed of a run: other scenes, other units, other textures of the same kinds."""
+
 
 @dataclass(frozen=True)
 class TrainingOptions:

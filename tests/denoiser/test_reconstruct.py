@@ -9,7 +9,7 @@ import torch
 from denoiser.networks.reconstructor_recipe import LEARNED, WIDTH_STEP, ReconstructorRecipe, reconstructor_recipe
 from denoiser.reconstruct import RECONSTRUCTORS, reconstruct, reconstruct_many
 from denoiser.reconstruct.pictures import PLAIN, light, window_about
-from denoiser.reconstructor_weights import load_reconstructor, save_reconstructor
+from denoiser.weights import load_reconstructor, save_weights
 from spikecam_env.errors import InputError
 from spikecam_env.streams import middleTFI, middleTFP
 
@@ -23,7 +23,7 @@ def untrained(tmp_path):
     found = {}
     for name, recipe in NARROW.items():
         torch.manual_seed(0)
-        save_reconstructor(tmp_path / f"{name}.pt", name, recipe, recipe.network(), {"steps": 0})
+        save_weights(tmp_path / f"{name}.pt", name, recipe, recipe.network(), {"steps": 0})
         found[name] = (load_reconstructor(tmp_path / f"{name}.pt")[1], tmp_path / f"{name}.pt")
     return found
 
@@ -159,7 +159,7 @@ def test_a_checkpoint_written_anew_is_read_anew(untrained, tmp_path):
     path = untrained["ssml"][1]
     before = reconstruct("ssml", SPIKES, 30, weights=path)
     torch.manual_seed(1)
-    save_reconstructor(path, "ssml", NARROW["ssml"], NARROW["ssml"].network(), {})
+    save_weights(path, "ssml", NARROW["ssml"], NARROW["ssml"].network(), {})
     os.utime(path, ns=(1, 1))  # file systems may count time in seconds
     assert not np.array_equal(reconstruct("ssml", SPIKES, 30, weights=path), before)
 

@@ -10,7 +10,6 @@ import torch
 
 from denoiser.networks import spk2imgnet, ssml
 from denoiser.networks.reconstructor_recipe import LEARNED, WIDTH_STEP, reconstructor_recipe
-from denoiser.reconstructor_weights import load_reconstructor
 from denoiser.training import lessons, training_loop
 from denoiser.training import train_reconstructor as training
 from denoiser.training.lessons import LessonWindows, lesson_of
@@ -18,6 +17,7 @@ from denoiser.training.resumable_run import Run
 from denoiser.training.rolling import RollingWindows
 from denoiser.training.simulated import TWINS, Bank, StreamBlock
 from denoiser.training.train_reconstructor import ReconstructorConfig, train_reconstructor
+from denoiser.weights import load_reconstructor
 from spikecam_env.errors import InputError
 from spikecam_env.streams import isi_plane
 

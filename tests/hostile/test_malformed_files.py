@@ -17,8 +17,7 @@ from tally import each, reads_or_refuses
 
 from denoiser.evaluate.work import FORMAT, Results
 from denoiser.networks.reconstructor_recipe import WIDTH_STEP, reconstructor_recipe
-from denoiser.reconstructor_weights import load_reconstructor, save_reconstructor
-from denoiser.weights import load_weights, pretrained_path
+from denoiser.weights import load_reconstructor, load_weights, pretrained_path, save_weights
 from spikecam_env.calibration import write_flats
 from spikecam_env.campaign import read_campaign
 from spikecam_env.campaign.writing import save_rates
@@ -458,7 +457,7 @@ def _reconstructor() -> bytes:
     """An untrained one; `test_weights_come_back_to_half_precision` reads such a file."""
     recipe = reconstructor_recipe("ssml", WIDTH_STEP)
     with tempfile.TemporaryDirectory() as folder:
-        save_reconstructor(Path(folder) / "x.pt", "ssml", recipe, recipe.network(), {})
+        save_weights(Path(folder) / "x.pt", "ssml", recipe, recipe.network(), {})
         return (Path(folder) / "x.pt").read_bytes()
 
 
