@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from contextlib import nullcontext
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import tyro
 
@@ -39,14 +38,10 @@ class Quick:
 
     def run(self) -> None:
         from denoiser.evaluate import evaluate_quick, report
-        from spikecam_env.cli.files import out_folder
+        from spikecam_env.cli.files import show_evaluation
 
-        weights = self.weights.by_mode()
-        with nullcontext() if self.out is None else out_folder(self.out) as folder:
-            result = evaluate_quick(self.modes, weights=weights, scenes_a_class=self.scenes, seed=self.seed, out=folder)
-        print(report(result), end="")
-        if self.out is not None:
-            print(f"wrote evaluate.json and evaluate.txt in {self.out}")
+        options: dict[str, Any] = {"weights": self.weights.by_mode(), "scenes_a_class": self.scenes, "seed": self.seed}
+        show_evaluation("evaluate", self.out, lambda: evaluate_quick(self.modes, **options), report)
 
 
 @dataclass

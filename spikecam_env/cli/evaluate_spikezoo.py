@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from contextlib import nullcontext
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -33,13 +32,12 @@ class SpikeZoo:
 
     def run(self) -> None:
         from denoiser.evaluate.spikezoo import evaluate_spikezoo, report
-        from denoiser.evaluate.writing import write_result
-        from spikecam_env.cli.files import out_folder
+        from spikecam_env.cli.files import show_evaluation
 
-        with nullcontext() if self.out is None else out_folder(self.out) as folder:
-            result = evaluate_spikezoo(self.folder, self.modes, weights=self.weights.by_mode(), rate=self.rate)
-            if folder is not None:
-                write_result(folder, "spikezoo", result, report(result))
-        print(report(result), end="")
-        if self.out is not None:
-            print(f"wrote spikezoo.json and spikezoo.txt in {self.out}")
+        weights = self.weights.by_mode()
+        show_evaluation(
+            "spikezoo",
+            self.out,
+            lambda: evaluate_spikezoo(self.folder, self.modes, weights=weights, rate=self.rate),
+            report,
+        )

@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from contextlib import nullcontext
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 from spikecam_env.cli.mode_weights import Mode, ModeWeights
 from spikecam_env.numbers import Seed, WholeRange
@@ -37,20 +36,9 @@ class EvaluateTruth:
 
     def run(self) -> None:
         from denoiser.evaluate.truth import evaluate_truth, report
-        from denoiser.evaluate.writing import write_result
-        from spikecam_env.cli.files import out_folder
+        from spikecam_env.cli.files import show_evaluation
 
-        with nullcontext() if self.out is None else out_folder(self.out) as folder:
-            result = evaluate_truth(
-                self.static,
-                self.moving,
-                self.modes,
-                weights=self.weights.by_mode(),
-                scenes=self.scenes,
-                seed=self.seed,
-            )
-            if folder is not None:
-                write_result(folder, "truth", result, report(result))
-        print(report(result), end="")
-        if self.out is not None:
-            print(f"wrote truth.json and truth.txt in {self.out}")
+        options: dict[str, Any] = {"weights": self.weights.by_mode(), "scenes": self.scenes, "seed": self.seed}
+        show_evaluation(
+            "truth", self.out, lambda: evaluate_truth(self.static, self.moving, self.modes, **options), report
+        )
