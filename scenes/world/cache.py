@@ -12,8 +12,8 @@ from dataclasses import dataclass
 from typing import Generic, TypeVar
 
 from scenes.renderers.protocol import PictureWindow, Pinhole, Sprite
+from scenes.world.body_key import BodyKey
 from scenes.world.extent import Probe, probe_of
-from scenes.world.layers import BodyKey
 from scenes.world.plan import BlockPlan, Pace
 from scenes.world.spec import WorldSpec
 from spikecam_env.types import Floats, Pictures

@@ -9,7 +9,7 @@ import trimesh
 from numpy.typing import NDArray
 
 from scenes.renderers.protocol import PictureWindow
-from scenes.world.layers import project
+from scenes.world.carried import project
 from spikecam_env.types import Floats
 
 PROBES = 256

@@ -12,9 +12,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scenes.protocol import Gaze
+from scenes.world.body_key import BodyKey, render_key
 from scenes.world.cache import WorldCache
+from scenes.world.carried import Carried, carry
 from scenes.world.extent import extent
-from scenes.world.layers import BodyKey, Carried, carry, lay, render_key
+from scenes.world.layers import lay
 from scenes.world.plan import BLOCK, BlockPlan, pace_of
 from scenes.world.sky import sky
 from scenes.world.spec import WorldSpec, gaze_offsets

@@ -1,7 +1,7 @@
 """The plan of a block of frames: it follows from the motion in the block alone.
 
 How often light is given and the order in which bodies are laid over each other (`plan_block`), and how often each body
-is rendered (`pace_of`; `layers.py` carries it in between).  So a key's time and light depend on nothing but the
+is rendered (`pace_of`; `carried.py` carries it in between).  So a key's time and light depend on nothing but the
 world.  A body's pace takes longer to find than all the rest, and ground truth does without it.
 """
 
@@ -14,8 +14,8 @@ import numpy as np
 
 from scenes.protocol import Gaze
 from scenes.renderers.protocol import Lighting
+from scenes.world.carried import fit, project
 from scenes.world.extent import Probe, boxes_overlap, extent
-from scenes.world.layers import fit, project
 from scenes.world.spec import WorldSpec
 from spikecam_env.types import Floats, Masks
 

@@ -19,7 +19,8 @@ from scenes.renderers.protocol import Lighting, PictureWindow, Pinhole
 from scenes.textures import blobs, dead_leaves
 from scenes.trajectories import AT_REST, Ballistic, Path, Shake, Spinning, Still, Trajectory, Vibrating
 from scenes.world import Body, World
-from scenes.world.layers import carry, project, render_key
+from scenes.world.body_key import render_key
+from scenes.world.carried import carry, project
 from scenes.world.plan import BLOCK, pace_of
 from spikecam_env.errors import InputError
 
