@@ -13,16 +13,10 @@ from functools import cached_property
 import numpy as np
 
 from scenes.flat.painted_disk import PlacedDisc, Plane, Texels
-from scenes.flat.planes import PlanarScene, painted_planes
-from scenes.keys import interval_for, key_frames
-from scenes.protocol import Gaze, Truth
+from scenes.flat.planes import MovingDisc, PlanarScene
+from scenes.protocol import Gaze
 from spikecam_env.compiled import njit
 from spikecam_env.types import Floats, Pictures
-
-MOTION_PER_KEY = 0.6
-"""Most that anything moves between two keys [pixels], as of `scenes.flat.disk`: 1.2 % rms of a frame's light."""
-
-_AT_REST = Gaze.fixed(0.0, 0.0)
 
 
 @dataclass(frozen=True, eq=False)
@@ -86,13 +80,15 @@ class Disc:
         """[radians/frame]"""
         return 2 * np.pi * self.rpm / (60 * frame_rate_hz)
 
+    def at(self, frame: float, frame_rate_hz: float) -> MovingDisc:
+        """The disc at a frame."""
+        turn = self.turn(frame_rate_hz)
+        return MovingDisc(self.path.at(frame), self.path.velocity(frame), self.angle + turn * frame, turn, self.radius)
+
 
 @dataclass(frozen=True, eq=False)
 class Discs(PlanarScene):
-    """Scene: see the head of this file.
-
-    Truth: object n is the n-th disc; poses[name] is (x, y, angle).
-    """
+    """Scene: see the head of this file."""
 
     shape: tuple[int, int]
     frame_rate_hz: float
@@ -101,49 +97,21 @@ class Discs(PlanarScene):
     discs: dict[str, Disc]
     """By name, from the back."""
 
-    def plane(self, start: int, stop: int, gaze: Gaze | None = None) -> Plane:
+    def placed_discs(self, frame: float) -> dict[str, MovingDisc]:
         """See `PlanarScene`."""
-        interval = interval_for(self._own_speed + (float(np.hypot(*gaze.rate)) if gaze else 0.0), MOTION_PER_KEY)
-        return self._at(key_frames(self.shape, start, stop, interval, gaze), gaze or _AT_REST)
+        return {name: disc.at(frame, self.frame_rate_hz) for name, disc in self.discs.items()}
 
-    def truth(self, frame: float, gaze: Gaze | None = None) -> Truth:
-        """Ground truth at a frame; see `scenes.protocol.Truth`."""
-        gaze = gaze or _AT_REST
-        radiance = painted_planes([self._at(np.array([frame], np.float64), gaze)])[0].radiance[0]
-        flow, owner = np.zeros((*self.shape, 2), np.float32), np.zeros(self.shape, np.int32)
-        rows, columns = np.indices(self.shape)
-        poses: dict[str, tuple[float, ...]] = {"camera": gaze.at(frame)}
-        for number, (name, disc) in enumerate(self.discs.items(), 1):
-            x, y = self._centre(disc, frame, gaze)
-            vx, vy = disc.path.velocity(frame)
-            turn = disc.turn(self.frame_rate_hz)
-            inside = (columns - x) ** 2 + (rows - y) ** 2 <= disc.radius**2
-            flow[inside, 0], flow[inside, 1] = (turn * (rows - y) + vx)[inside], (vy - turn * (columns - x))[inside]
-            owner[inside] = number
-            poses[name] = (x, y, (disc.angle + turn * frame) % (2 * np.pi))
-        return Truth(radiance, flow - np.asarray(gaze.rate, np.float32), owner, None, poses)
-
-    def places(self, frame: float, gaze: Gaze | None = None) -> dict[str, tuple[float, float]]:
-        """Where the discs' middles are seen, see `scenes.protocol.Placed`."""
-        return {name: self._centre(disc, frame, gaze or _AT_REST) for name, disc in self.discs.items()}
+    def speed(self) -> float:
+        """See `PlanarScene`."""
+        return self._speed
 
     def lit(self, gain: float) -> Discs:
         """The same with `gain` times its light."""
         lit = {name: replace(disc, texels=disc.texels.lit(gain)) for name, disc in self.discs.items()}
         return replace(self, tile=self.tile * np.float32(gain), discs=lit)
 
-    @cached_property
-    def _own_speed(self) -> float:
-        """Of the fastest point [pixels/frame], before a camera at rest."""
-        speeds = [d.path.speed + abs(d.turn(self.frame_rate_hz)) * d.radius for d in self.discs.values()]
-        return max(speeds, default=0.0)
-
-    def _centre(self, disc: Disc, frame: float, gaze: Gaze) -> tuple[float, float]:
-        (x, y), (pan, tilt) = disc.path.at(frame), gaze.at(frame)
-        return x - pan, y - tilt
-
-    def _at(self, frame: Floats, gaze: Gaze) -> Plane:
-        """The plane at these frames (K,)."""
+    def plane_at(self, frame: Floats, gaze: Gaze) -> Plane:
+        """See `PlanarScene`."""
         pan, tilt = gaze.at(frame)
         laid = []
         for disc in self.discs.values():
@@ -151,6 +119,11 @@ class Discs(PlanarScene):
             angle = disc.angle + disc.turn(self.frame_rate_hz) * frame
             laid.append(PlacedDisc(disc.texels, disc.radius, x - pan, y - tilt, angle))
         return Plane(self.shape, frame, self.tile, pan, tilt, laid)
+
+    @cached_property
+    def _speed(self) -> float:
+        speeds = [d.path.speed + abs(d.turn(self.frame_rate_hz)) * d.radius for d in self.discs.values()]
+        return max(speeds, default=0.0)
 
 
 @njit(cache=True, nogil=True)

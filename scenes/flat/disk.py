@@ -23,9 +23,8 @@ import scipy
 from numpy.typing import ArrayLike
 
 from scenes.flat.painted_disk import PlacedDisc, Plane, Texels, paint_tile, prefiltered
-from scenes.flat.planes import PlanarScene, painted_planes
-from scenes.keys import interval_for, key_frames
-from scenes.protocol import FRAME_RATES_HZ, MOST_LIGHT, MOST_PLACE, Gaze, Truth
+from scenes.flat.planes import MovingDisc, PlanarScene
+from scenes.protocol import FRAME_RATES_HZ, MOST_LIGHT, MOST_PLACE, Gaze
 from scenes.textures import Texture, dead_leaves, fractal_noise
 from spikecam_env.checked import LARGEST_DERIVED_SEED, checked_number, checked_seed, checked_shape
 from spikecam_env.errors import InputError
@@ -119,32 +118,21 @@ class RotatingDisk(PlanarScene):
             f"centre={self.centre}, drift_px_s={self.drift_px_s}, angle={self.angle:g})"
         )
 
-    def plane(self, start: int, stop: int, gaze: Gaze | None = None) -> Plane:
+    def placed_discs(self, frame: float) -> dict[str, MovingDisc]:
         """See `PlanarScene`."""
-        interval = interval_for(self._speed(gaze), self.motion_per_key)
-        return self._at(key_frames(self.shape, start, stop, interval, gaze), gaze or _AT_REST)
+        x, y = self.drift_px_s
+        drift = (x / self.frame_rate_hz, y / self.frame_rate_hz)
+        return {"disk": MovingDisc(self.centre_at(frame), drift, self.angle_at(frame), self._turn, self.radius)}
 
-    def truth(self, frame: float, gaze: Gaze | None = None) -> Truth:
-        """Ground truth at a frame; see `scenes.protocol.Truth`."""
-        gaze = gaze or _AT_REST
-        x, y = self.centre_at(frame, gaze)
-        dx, dy = np.arange(self.shape[1]) - x, (np.arange(self.shape[0]) - y)[:, None]
-        inside = dx**2 + dy**2 <= self.radius**2
-        drift = np.asarray(self.drift_px_s) / self.frame_rate_hz
-        radiance = painted_planes([self._at(np.array([frame], np.float64), gaze)])[0].radiance[0]
-        flow = np.empty((*self.shape, 2), np.float32)
-        flow[..., 0] = np.where(inside, self._turn * dy + drift[0], 0.0) - gaze.rate[0]
-        flow[..., 1] = np.where(inside, -self._turn * dx + drift[1], 0.0) - gaze.rate[1]
-        return Truth(
-            radiance=radiance,
-            flow=flow,
-            object_id=inside.astype(np.int32),
-            poses={"disk": (x, y, self.angle_at(frame)), "camera": gaze.at(frame)},
-        )
+    def speed(self) -> float:
+        """See `PlanarScene`."""
+        return self.rim_speed + float(np.hypot(*self.drift_px_s)) / self.frame_rate_hz
 
-    def places(self, frame: float, gaze: Gaze | None = None) -> dict[str, tuple[float, float]]:
-        """Where the disk's middle is seen, see `scenes.protocol.Placed`."""
-        return {"disk": self.centre_at(frame, gaze)}
+    def plane_at(self, frame: Floats, gaze: Gaze) -> Plane:
+        """See `PlanarScene`."""
+        x, y = np.clip(self.centre_at(frame, gaze), -MOST_PLACE, MOST_PLACE)
+        disk = PlacedDisc(self._disk, self.radius, x, y, self.angle_at(frame))
+        return Plane(self.shape, frame, self._tile, *gaze.at(frame), [disk], self._background)
 
     def placed(
         self, centre: tuple[float, float], drift_px_s: tuple[float, float] = (0.0, 0.0), angle: float = 0.0
@@ -184,17 +172,6 @@ class RotatingDisk(PlanarScene):
     @property
     def _turn(self) -> float:
         return 2 * np.pi * self.rpm / (60 * self.frame_rate_hz)
-
-    def _speed(self, gaze: Gaze | None) -> float:
-        """Of the fastest point [pixels/frame]."""
-        moving = self.rim_speed + float(np.hypot(*self.drift_px_s)) / self.frame_rate_hz
-        return moving + (float(np.hypot(*gaze.rate)) if gaze else 0.0)
-
-    def _at(self, frame: Floats, gaze: Gaze) -> Plane:
-        """The plane at these frames (K,)."""
-        x, y = np.clip(self.centre_at(frame, gaze), -MOST_PLACE, MOST_PLACE)
-        disk = PlacedDisc(self._disk, self.radius, x, y, self.angle_at(frame))
-        return Plane(self.shape, frame, self._tile, *gaze.at(frame), [disk], self._background)
 
 
 def _default_radius(shape: tuple[int, int]) -> float:

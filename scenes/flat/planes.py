@@ -8,25 +8,81 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from functools import partial
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from scenes.flat.painted_disk import PlacedDisc, Plane, paint_scenes, parts_of, places_of
-from scenes.keys import threads_for
-from scenes.protocol import Gaze
+from scenes.keys import interval_for, key_frames, threads_for
+from scenes.protocol import Gaze, Truth
 from spikecam_env.sensor import Keyframes
 from spikecam_env.sensor.compiled_tools.intrinsics import address_of
 from spikecam_env.threads import together
 from spikecam_env.types import Floats, Pictures
 
+_AT_REST = Gaze.fixed(0.0, 0.0)
+
+
+class MovingDisc(NamedTuple):
+    """A disc at an instant, before a camera at rest."""
+
+    centre: tuple[float, float]
+    """(x, y) [pixels]."""
+    velocity: tuple[float, float]
+    """(x, y) [pixels/frame]."""
+    angle: float
+    """[radians]."""
+    turn: float
+    """[radians/frame]; positive is counter-clockwise."""
+    radius: float
+    """[pixels]."""
+
 
 class PlanarScene:
-    """Base of scenes whose light is a `Plane`."""
+    """Base of scenes whose light is a `Plane`: a tile, and discs that turn and move before it."""
+
+    shape: tuple[int, int]
+    motion_per_key: float = 0.6
+    """Most that anything moves between two keys [pixels]: 1.2 % rms of a frame's light."""
+
+    def speed(self) -> float:
+        """Of the fastest point [pixels/frame], before a camera at rest."""
+        raise NotImplementedError
+
+    def placed_discs(self, frame: float) -> dict[str, MovingDisc]:
+        """The discs at a frame by name, from the back."""
+        raise NotImplementedError
+
+    def plane_at(self, frame: Floats, gaze: Gaze) -> Plane:
+        """The plane at these frames (K,)."""
+        raise NotImplementedError
 
     def plane(self, start: int, stop: int, gaze: Gaze | None = None) -> Plane:
         """The plane at the keys that cover frames [start, stop]."""
-        raise NotImplementedError
+        interval = interval_for(self.speed() + (float(np.hypot(*gaze.rate)) if gaze else 0.0), self.motion_per_key)
+        return self.plane_at(key_frames(self.shape, start, stop, interval, gaze), gaze or _AT_REST)
+
+    def truth(self, frame: float, gaze: Gaze | None = None) -> Truth:
+        """Ground truth at a frame: object n is the n-th disc, poses[name] its (x, y, angle); see `protocol.Truth`."""
+        gaze = gaze or _AT_REST
+        radiance = painted_planes([self.plane_at(np.array([frame], np.float64), gaze)])[0].radiance[0]
+        flow, owner = np.zeros((*self.shape, 2)), np.zeros(self.shape, np.int32)
+        poses: dict[str, tuple[float, ...]] = {}
+        pan, tilt = gaze.at(frame)
+        for number, (name, disc) in enumerate(self.placed_discs(frame).items(), 1):
+            x, y = disc.centre[0] - pan, disc.centre[1] - tilt
+            dx, dy = np.arange(self.shape[1]) - x, (np.arange(self.shape[0]) - y)[:, None]
+            inside = dx**2 + dy**2 <= disc.radius**2
+            flow[..., 0] = np.where(inside, disc.turn * dy + disc.velocity[0], flow[..., 0])
+            flow[..., 1] = np.where(inside, -disc.turn * dx + disc.velocity[1], flow[..., 1])
+            owner[inside] = number
+            poses[name] = (x, y, disc.angle % (2 * np.pi))
+        return Truth(radiance, (flow - gaze.rate).astype(np.float32), owner, None, poses | {"camera": gaze.at(frame)})
+
+    def places(self, frame: float, gaze: Gaze | None = None) -> dict[str, tuple[float, float]]:
+        """Where the discs' middles are seen, see `scenes.protocol.Placed`."""
+        pan, tilt = (gaze or _AT_REST).at(frame)
+        return {name: (d.centre[0] - pan, d.centre[1] - tilt) for name, d in self.placed_discs(frame).items()}
 
     def radiance(self, start: int, stop: int, gaze: Gaze | None = None, *, device: Any = None) -> Keyframes:
         """Keys that cover frames [start, stop]: (K,) float64 whole frames, (K, H, W) float32.
