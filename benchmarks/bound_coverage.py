@@ -14,9 +14,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterator, Sequence
-from concurrent.futures import ProcessPoolExecutor, as_completed
 from dataclasses import asdict, dataclass, replace
-from multiprocessing import get_context
 from pathlib import Path
 from typing import Any
 
@@ -39,6 +37,7 @@ from spikecam_env.gap.screen.templates import Templates, shipped_templates
 from spikecam_env.gap.twins.case import Case, case_of
 from spikecam_env.gap.twins.simulate import with_random_phases
 from spikecam_env.gap.verdict.bounds import bounds
+from spikecam_env.pool import spread
 from spikecam_env.sensor import SensorModel, SpikeSensor
 from spikecam_env.streams import pack_frames
 from spikecam_env.whole import write_text_whole
@@ -142,6 +141,10 @@ def wilson(successes: int, trials: int, z: float = 1.96) -> tuple[float, float]:
     return float((middle - half) / (1 + z * z / n)), float((middle + half) / (1 + z * z / n))
 
 
+def _trial(job: tuple[Bound, int]) -> BoundTrial:
+    return trial(*job)
+
+
 def main(out: Path, trials: int = 20, jobs: int = 1, only: tuple[str, ...] = ()) -> None:
     """Write and print the table.
 
@@ -156,12 +159,10 @@ def main(out: Path, trials: int = 20, jobs: int = 1, only: tuple[str, ...] = ())
     done = [BoundTrial(**t) for t in kept["trials"]]
     have = {(t.name, t.number) for t in done}
     left = [(b, n) for n in range(trials) for b in known if (b.name, n) not in have and (not only or b.name in only)]
-    with ProcessPoolExecutor(jobs, mp_context=get_context("spawn")) as pool:
-        running = [pool.submit(trial, *job) for job in left]
-        for one in tqdm(as_completed(running), "trials", len(running)):
-            done.append(one.result())
-            now = {"bounds": [asdict(b) for b in known], "trials": [asdict(t) for t in done]}
-            write_text_whole(out, json.dumps(now, indent=1))
+    for one in tqdm(spread(_trial, left, jobs), "trials", len(left)):
+        done.append(one)
+        now = {"bounds": [asdict(b) for b in known], "trials": [asdict(t) for t in done]}
+        write_text_whole(out, json.dumps(now, indent=1))
     print(table(list(rows(known, done))))
     covered = [
         t.alarm or t.below is None or t.below >= 0.999 * b.below for b in known for t in done if t.name == b.name

@@ -32,6 +32,15 @@ def limit_threads(count: int | None) -> None:
     _limit = count
 
 
+def use_one_thread() -> None:
+    """One thread a process, for compiled kernels, pictures and software rendering: the processes share the cores."""
+    import cv2
+
+    limit_threads(1)
+    cv2.setNumThreads(1)
+    os.environ["LP_NUM_THREADS"] = "1"  # of Mesa's software renderer, read when it starts
+
+
 def as_many(threads: int | None, most: int) -> int:
     """Number of threads to share work among, `threads` or the default, at most `most`."""
     default = config.NUMBA_NUM_THREADS if _limit is None else _limit  # type: ignore[attr-defined]

@@ -7,8 +7,7 @@ import sys
 
 import pytest
 
-from spikecam_env.datasets.processes import use_one_thread
-from spikecam_env.threads import as_many, limit_threads
+from spikecam_env.threads import as_many, limit_threads, use_one_thread
 
 PAINTED = """
 import torch

@@ -1,18 +1,14 @@
 """Rows of cases, in this process or in several; each result is saved at once.
 
 A unit of work is one source (`rows.ROWS`) of one case: its rows share a run of its network.  Results in the file are
-not
-made again, unless the weights have changed since.
+not made again, unless the weights have changed since.
 """
 
 from __future__ import annotations
 
 import json
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from concurrent.futures import ProcessPoolExecutor, as_completed
-from concurrent.futures.process import BrokenProcessPool
 from dataclasses import dataclass
-from multiprocessing import get_context
 from pathlib import Path
 from typing import Any
 
@@ -23,7 +19,8 @@ from denoiser.evaluate.exposed import CLASSICAL, ExposedStreams, StreamCase
 from denoiser.evaluate.judge import RowResult, display, judged, pictures_of
 from denoiser.evaluate.rows import ROWS, Weights, planes_a_pass, streams, weights_of
 from spikecam_env.errors import InputError, shown
-from spikecam_env.stopping import without_interrupts
+from spikecam_env.pool import spread
+from spikecam_env.threads import use_one_thread
 from spikecam_env.untrusted import declared, parse_json, read_text
 from spikecam_env.whole import whole_file, write_text_whole
 
@@ -100,22 +97,7 @@ def undone(wanted: Sequence[WorkItem], results: Results) -> list[WorkItem]:
 
 def work(todo: Sequence[WorkItem], jobs: int = 1) -> Iterator[list[RowResult]]:
     """Records of the tasks as they are done, in so many processes (1: in this one); InputError where one dies."""
-    if jobs == 1 or len(todo) < 2:
-        yield from map(do, todo)
-        return
-    pool = ProcessPoolExecutor(min(jobs, len(todo)), mp_context=get_context("spawn"), initializer=_one_thread)
-    try:
-        with without_interrupts():  # it starts the processes
-            waiting = [pool.submit(do, task) for task in todo]
-        for done in as_completed(waiting):
-            yield done.result()
-    except BrokenProcessPool as error:
-        raise InputError(
-            "a worker process died, perhaps for want of memory; run the same command with fewer jobs: "
-            "it goes on where this one stopped"
-        ) from error
-    finally:
-        pool.shutdown(wait=False, cancel_futures=True)
+    return spread(do, todo, jobs, prepare=_one_thread)
 
 
 def do(task: WorkItem) -> list[RowResult]:
@@ -172,8 +154,6 @@ def _is_done(task: WorkItem, row: str, results: Results) -> bool:
 
 def _one_thread() -> None:
     import torch
-
-    from spikecam_env.datasets.processes import use_one_thread
 
     use_one_thread()
     torch.set_num_threads(1)

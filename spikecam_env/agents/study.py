@@ -6,10 +6,8 @@ are lines of a record, so that a study goes on where it was stopped.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Sequence
-from concurrent.futures import ProcessPoolExecutor, as_completed
+from collections.abc import Iterable, Sequence
 from functools import partial
-from multiprocessing import get_context
 from pathlib import Path
 from typing import Annotated, Any, TypeVar
 
@@ -24,9 +22,9 @@ from spikecam_env.agents.ppo import PPO
 from spikecam_env.agents.tracker import Tracker
 from spikecam_env.agents.training import SIGHTS, Study, agents_along, learner, train_agent
 from spikecam_env.checked import checked_number
-from spikecam_env.datasets.ray_cluster import connected
 from spikecam_env.envs.tasks.low_light import LowLight
 from spikecam_env.errors import InputError, unknown_name
+from spikecam_env.pool import spread
 from spikecam_env.run_folder import run_folder
 from spikecam_env.untrusted import Count, Declared, Name, Positive, Seed, Side, Whole, declared, parse_json, read_text
 from spikecam_env.whole import write_text_whole
@@ -244,33 +242,6 @@ def read_record(path: Path) -> list[Result]:
         return []
     lines = enumerate(read_text(path).splitlines(), 1)
     return [declared(Result, parse_json(line, f"{path} line {n}"), f"{path} line {n}") for n, line in lines]
-
-
-def spread(work: Callable[[T], R], items: Iterable[T], jobs: int, ray: str | None) -> Iterator[R]:
-    """Results in any order.
-
-    Args:
-        work: of an item.
-        items: any.
-        jobs: processes; 1 works in this one.
-        ray: address of a Ray cluster that works instead, or "local".
-    """
-    if ray is not None:
-        with connected(ray, jobs) as cluster:
-            task = cluster.remote(num_cpus=1)(_done)
-            waiting = [task.remote(work, item) for item in items]
-            while waiting:
-                done, waiting = cluster.wait(waiting)
-                yield cluster.get(done[0])
-    elif jobs == 1:
-        yield from map(work, items)
-    else:
-        with ProcessPoolExecutor(jobs, mp_context=get_context("spawn")) as pool:
-            yield from (done.result() for done in as_completed([pool.submit(work, item) for item in items]))
-
-
-def _done(work: Callable[[T], R], item: T) -> R:
-    return work(item)
 
 
 def summary(results: Sequence[Result]) -> list[dict[str, Any]]:

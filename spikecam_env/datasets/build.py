@@ -21,10 +21,11 @@ from spikecam_env.checked import checked_count, checked_disk
 from spikecam_env.datasets.manifest import NAME, Manifest
 from spikecam_env.datasets.plan import Plan, PlannedScene
 from spikecam_env.datasets.processes import on_processes
-from spikecam_env.datasets.ray_cluster import connected, on_ray
+from spikecam_env.datasets.ray_cluster import on_ray
 from spikecam_env.datasets.renderer import AUTO, first_that_works
 from spikecam_env.datasets.write import Written, write_scene
 from spikecam_env.errors import InputError
+from spikecam_env.pool import connected
 from spikecam_env.run_folder import run_folder
 from spikecam_env.stopping import when_stopped
 from spikecam_env.streams.packing import packed_bytes

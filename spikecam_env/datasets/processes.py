@@ -18,13 +18,11 @@ from multiprocessing.connection import Connection
 from multiprocessing.process import BaseProcess
 from pathlib import Path
 
-import cv2
-
 from spikecam_env.datasets.plan import Plan, PlannedScene
 from spikecam_env.datasets.write import Written, write_scene
 from spikecam_env.errors import InputError
 from spikecam_env.stopping import without_interrupts
-from spikecam_env.threads import limit_threads
+from spikecam_env.threads import use_one_thread
 
 ATTEMPTS = 3
 """Deaths of workers over one scene before the run gives up."""
@@ -127,13 +125,6 @@ def _work(pipe: Connection, plan: Plan, folder: Path) -> None:
         pipe.send(error)
     except Exception:
         pipe.send(RuntimeError(f"a worker failed:\n{traceback.format_exc()}"))
-
-
-def use_one_thread() -> None:
-    """One thread a process, for compiled kernels, pictures and software rendering: the processes share the cores."""
-    limit_threads(1)
-    cv2.setNumThreads(1)
-    os.environ["LP_NUM_THREADS"] = "1"  # of Mesa's software renderer, read when it starts
 
 
 def _end_with_parent() -> None:

@@ -1,25 +1,16 @@
-"""Scenes on a Ray cluster: one task a scene, run again elsewhere when its worker dies.
-
-Ray is an optional package (`pip install spikecam-env[ray]`), imported when first asked for.
-"""
+"""Scenes on a Ray cluster: one task a scene, run again elsewhere when its worker dies."""
 
 from __future__ import annotations
 
-import logging
-import os
-import socket
 from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
 from types import ModuleType
 
 from spikecam_env.datasets.plan import Plan, PlannedScene
-from spikecam_env.datasets.processes import use_one_thread
 from spikecam_env.datasets.write import Written, write_scene
 from spikecam_env.errors import InputError
+from spikecam_env.threads import use_one_thread
 
-LOCAL = "local"
-ANSWER_S = 10.0
 RETRIES = 3
 """Times that a scene is begun again after its worker died."""
 
@@ -28,7 +19,7 @@ def on_ray(ray: ModuleType, plan: Plan, folder: Path, entries: tuple[PlannedScen
     """Files as they are done, in any order, and with each its number of frames.
 
     Args:
-        ray: as of `connected`, to a cluster where the package is installed.
+        ray: as of `pool.connected`, to a cluster where the package is installed.
         plan: of the dataset.
         folder: storage that all machines of the cluster share.
         entries: scenes to make.
@@ -71,48 +62,3 @@ def _result(ray: ModuleType, reference: object) -> Written:
             "run the same command again: it makes the others"
         ) from error
     return written
-
-
-def _check_answers(address: str) -> None:
-    """Ray itself asks for minutes before it gives up."""
-    host, colon, port = address.removeprefix("ray://").rpartition(":")
-    if not colon:
-        return
-    try:
-        socket.create_connection((host, int(port)), timeout=ANSWER_S).close()
-    except (OSError, ValueError) as error:
-        raise InputError(f"no Ray cluster answers at {address!r} ({error}); give host:port, auto or {LOCAL}") from error
-
-
-@contextmanager
-def connected(address: str, jobs: int) -> Iterator[ModuleType]:
-    """Ray, connected to a cluster within the block.
-
-    Args:
-        address: of a running cluster, or LOCAL for one on this machine that ends with the block.  A cluster that asks
-            for a token wants RAY_AUTH_MODE=token, and the token, set for this process too.
-        jobs: workers of a LOCAL cluster.
-
-    Raises:
-        InputError: without Ray, or without that cluster.
-    """
-    os.environ.setdefault("RAY_USAGE_STATS_ENABLED", "0")
-    try:
-        import ray
-    except ImportError as error:
-        raise InputError("Ray is not installed; pip install 'spikecam-env[ray]', or leave out --ray") from error
-    _check_answers(address)
-    try:
-        if address == LOCAL:
-            ray.init(num_cpus=jobs, include_dashboard=False, logging_level=logging.ERROR, log_to_driver=False)
-        else:
-            ray.init(address=address, logging_level=logging.ERROR, log_to_driver=False)
-    except (ConnectionError, RuntimeError, ValueError) as error:
-        raise InputError(
-            f"no Ray cluster at {address!r}: {error}; give its address, or {LOCAL!r}; "
-            "to one that asks for a token this command goes with RAY_AUTH_MODE=token too"
-        ) from error
-    try:
-        yield ray
-    finally:
-        ray.shutdown()
