@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from denoiser.online import OnlineDnSS
 from denoiser.passes.infer import on_host
+from denoiser.passes.passes import passes_of
 from spikecam_env.checked import checked_count, checked_shape
 from spikecam_env.errors import InputError
 
@@ -37,7 +38,7 @@ class ManyDnSS:
         if like.overlap:
             raise InputError("overlap is True; many streams are denoised by one chain of passes each, leave it False")
         self._like, self.shape = like, checked_shape(shape)
-        self._passes = like.engine.passes(self.shape, checked_count(streams, "streams"))
+        self._passes = passes_of(like.engine, self.shape, checked_count(streams, "streams"))
 
     def __len__(self) -> int:
         return len(self._passes)

@@ -25,8 +25,8 @@ from denoiser.decoders import accumulate, mus
 from denoiser.passes.crossfade import Crossfade
 from denoiser.passes.engine import Engine
 from denoiser.passes.infer import on_host
-from denoiser.passes.on_device import DevicePasses, spikes_on, unpacked_on
-from denoiser.passes.on_host import HostPasses
+from denoiser.passes.on_device import spikes_on, unpacked_on
+from denoiser.passes.passes import Passes, passes_of
 from denoiser.passes.pixel_map import PixelMap
 from denoiser.passes.recipe import Recipe
 from denoiser.passes.window import check_like
@@ -147,7 +147,7 @@ class OnlineDnSS:
 
     def reset(self) -> None:
         """Forget the stream; the next may have another size."""
-        self._passes: list[HostPasses | DevicePasses] = []  # of the one stream; two that overlap
+        self._passes: list[Passes] = []  # of the one stream; two that overlap
         self._as_tensors = False
         self._mixing: Crossfade | None = None
         self._decoding: Any = None
@@ -236,7 +236,7 @@ class OnlineDnSS:
     def _begin(self, shape: tuple[int, int]) -> None:
         planes = self.engine.recipe.layout.planes
         firsts = (0, planes // 2) if self._overlap else (0,)
-        self._passes = [self.engine.passes(shape, first=first) for first in firsts]
+        self._passes = [passes_of(self.engine, shape, first=first) for first in firsts]
         self._mixing = Crossfade(planes, shape) if self._overlap else None
         self._decoding = _DECODERS[self._decoder].start(shape)
 

@@ -13,8 +13,6 @@ from torch import nn
 from denoiser.ground.number_type import PRECISIONS, number_type
 from denoiser.passes import infer
 from denoiser.passes.given_network import check_network, has_passes
-from denoiser.passes.on_device import DevicePasses
-from denoiser.passes.on_host import HostPasses
 from denoiser.passes.pixel_map import PixelMap
 from denoiser.passes.recipe import Recipe
 from denoiser.passes.window import PassWindow
@@ -78,12 +76,6 @@ class Engine:
         if place is not None:
             network = _moved(network, place)
         return cls(recipe, network, its_type, kind, int(stride), unit, place)
-
-    def passes(self, shape: tuple[int, int], streams: int = 1, first: int = 0) -> HostPasses | DevicePasses:
-        """Passes over streams of frames of `shape`, from frame `first` of each on."""
-        if self.device is None:
-            return HostPasses(self, shape, streams, first)
-        return DevicePasses(self, self.device, shape, streams, first)
 
     def run(self, windows: list[PassWindow], carried: list[infer.Carried]) -> list[tuple[Pictures, infer.Carried]]:
         """Rates of the windows of as many streams, and the carried arrays of each, in one pass of the network."""

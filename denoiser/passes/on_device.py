@@ -8,7 +8,7 @@ of a stream, over mirrored frames, are made by `HostPasses`, with the network wh
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import torch
@@ -19,13 +19,11 @@ from denoiser.ground.captured import captured
 from denoiser.ground.number_type import computing_in
 from denoiser.ground.torch_threads import where_torch_can
 from denoiser.passes import infer
+from denoiser.passes.engine import Engine
 from denoiser.passes.on_host import HostPasses
 from denoiser.passes.window_torch import StreamWindows, learned, pushed
 from spikecam_env.errors import InputError
 from spikecam_env.streams.packing import as_spikes
-
-if TYPE_CHECKING:
-    from denoiser.passes.engine import Engine
 
 
 class DevicePasses:

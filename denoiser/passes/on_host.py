@@ -11,17 +11,14 @@ from __future__ import annotations
 
 import copy
 from collections.abc import Iterable, Iterator
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
+from denoiser.passes.engine import Engine
 from denoiser.passes.infer import Carried
 from denoiser.passes.window import PassWindow, RollingWindow, check_like
 from spikecam_env.types import Masks, Pictures, Spikes
-
-if TYPE_CHECKING:
-    from denoiser.passes.engine import Engine
-    from denoiser.passes.on_device import DevicePasses
 
 
 class HostPasses:
@@ -66,9 +63,8 @@ class HostPasses:
         for number in np.flatnonzero(which):
             self._streams[number] = _Stream(self._engine, self.shape, self._first)
 
-    def exchange(self, which: Masks, others: HostPasses | DevicePasses) -> None:
-        """Put the streams of others in the place of these (N,); nothing is to be pushed to the others any more."""
-        assert isinstance(others, HostPasses)
+    def exchange(self, which: Masks, others: Any) -> None:
+        """Put the streams of other `HostPasses` in the place of these (N,); nothing is to be pushed to the others."""
         for number, stream in zip(np.flatnonzero(which), others._streams, strict=True):
             self._streams[number] = stream
 

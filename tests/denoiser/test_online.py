@@ -12,6 +12,7 @@ import torch
 from denoiser.online import OnlineDnSS, denoise
 from denoiser.passes import infer
 from denoiser.passes.engine import Engine
+from denoiser.passes.passes import passes_of
 from denoiser.passes.recipe import RECIPES
 from denoiser.passes.window import RollingWindow
 from spikecam_env.errors import InputError, NotReadyError
@@ -340,7 +341,7 @@ def test_overlapping_passes_are_the_mean_of_two_chains():
     alone = run(denoiser("best"), [spikes])[1]
     recipe = RECIPES["best"]
     torch.manual_seed(1)
-    passes = Engine.of(recipe, recipe.network()).passes(SHAPE, first=8)
+    passes = passes_of(Engine.of(recipe, recipe.network()), SHAPE, first=8)
     ((*done,), (*last,)) = passes.push(spikes[None])[0], passes.end()[0]
     later = np.concatenate([alone[:8], *(rates for _, rates in [*done, *last])])
     place = np.arange(90) % 16 + 0.5
