@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 from small import MODEL, effect, null, recorded
@@ -12,15 +10,12 @@ from spikecam_env.gap.candidates.strength import with_effect
 from spikecam_env.gap.candidates.table import candidate, chosen
 from spikecam_env.gap.candidates.table import testable as split_testable
 from spikecam_env.gap.compare.distance import robust_squares
-from spikecam_env.gap.compare.prediction import Prediction, values_of
+from spikecam_env.gap.compare.prediction import values_of
 from spikecam_env.gap.compare.step import scale_of
-from spikecam_env.gap.fit import problem as problem_module
-from spikecam_env.gap.fit.candidate import fit, slope_between
+from spikecam_env.gap.fit.candidate import fit
 from spikecam_env.gap.fit.predict import predict_by_twins
 from spikecam_env.gap.fit.problem import Problem, standing_on
-from spikecam_env.gap.fit.recordings import recordings_affected, with_held_out
-from spikecam_env.gap.twins.fresh_units import spread_factor
-from spikecam_env.gap.unit.indirect_inference import gain_change
+from spikecam_env.gap.fit.recordings import recordings_affected
 from spikecam_env.gap.unit.refit import constrained_refit
 from spikecam_env.sensor import CATALOGUE
 
@@ -36,27 +31,6 @@ def test_scale_is_recovered_within_its_stated_error(true):
     scale, sd = scale_of(true * change + rng.standard_normal(200), change, ONE, NONE)
     print(f"{scale:.4f} +- {sd:.4f}")
     assert abs(scale - true) < 4 * sd and sd < 0.1 * max(abs(true), 0.2)
-
-
-def test_the_slope_of_what_saturates_is_told_by_two_twins():
-    """The logarithm of a line beside noise: twice the strength is not four times the change.  A statistic that one
-    of the twins lacks is left out."""
-    n = null()
-    line = lambda strength: 40.0 * n.noise * np.log1p(strength**2)  # noqa: E731
-    one, other = (Prediction(n.mean + line(s), n.sd / np.sqrt(n.twins), n.sd) for s in (2.0, 2.4))
-    lacks = np.arange(len(n.keys)) % 2 == 0
-    one = replace(one, mean=np.where(lacks, n.mean, one.mean))
-    slope = slope_between(Problem(recorded(), MODEL, n, n.mean, n.mean), (2.0, one), (2.4, other))
-    assert slope is not None and np.all(slope[lacks] == 0)
-    assert slope[~lacks] / (40.0 * n.noise[~lacks]) == pytest.approx(2 * 2.2**2 / (1 + 2.2**2), rel=0.02)
-    assert slope_between(Problem(recorded(), MODEL, n, n.mean, n.mean), (2.4, one), (2.4, other)) is None, (
-        "no two strengths"
-    )
-    assert slope_between(Problem(recorded(), MODEL, n, n.mean, n.mean), None, (2.4, other)) is None, "no two twins"
-
-
-def test_an_effect_that_shows_nowhere_has_no_scale():
-    assert scale_of(ONE, NONE, ONE, NONE) == (0.0, np.inf)
 
 
 def test_a_few_statistics_that_another_effect_moves_do_not_move_the_scale_much():
@@ -142,15 +116,6 @@ def test_every_effect_of_the_catalogue_is_a_candidate_with_a_strength():
         assert set(entry.fitted) | set(entry.shapes) <= set(effect_class.__dataclass_fields__), name
 
 
-def test_pattern_effects_are_those_that_only_draw_units():
-    assert (
-        candidate("hot_pixels").is_pattern
-        and candidate("row_fixed_pattern").is_pattern
-        and not candidate("dead_time").is_pattern
-    )
-    assert not candidate("optical_blur").is_pattern and not candidate("reset_noise").is_pattern
-
-
 def test_what_the_model_has_is_no_candidate():
     names = chosen(MODEL, None, ["crosstalk"])
     assert not set(names) & ({e.name for e in MODEL.effects} | {"crosstalk"})
@@ -164,28 +129,6 @@ def test_what_needs_motion_is_not_testable_in_steady_light():
 
 
 # ---- twins
-
-
-def test_a_fit_without_hope_ends_with_its_first_twin(monkeypatch):
-    """Skew where only the dark drifts: nothing to scale, so nothing to try again."""
-    case, asked = recorded(effect("dark_current_drift", rise=0.3, tau_ms=50.0)), []
-    monkeypatch.setattr(
-        problem_module, "predict_by_twins", lambda *a, **k: asked.append(1) or predict_by_twins(*a, **k)
-    )
-    measured = values_of(case.bank, null().keys)
-    problem = Problem(case, MODEL, null(), measured, measured)
-    found = fit(problem, "readout_skew", {"span": 1.0})
-    print(f"{len(asked)} predictions, misfit {problem.misfit():.0f} to {found.misfit:.0f}")
-    assert len(asked) == 1 and found.parameters["span"] < 0.1
-
-
-def test_held_out_flats_are_simulated_only_where_a_refit_can_judge_them():
-    case = recorded()
-    moving = [i for i, c in enumerate(case.conditions) if c.moves and c.use == "fit"]
-    still = {i for i, c in enumerate(case.conditions) if not c.moves and c.use == "fit"}
-    held = {i for i, c in enumerate(case.conditions) if c.use != "fit"}
-    assert set(with_held_out(case, moving)) == set(moving)
-    assert set(with_held_out(case, sorted(still))) == still | held
 
 
 def test_beside_a_bend_what_shows_by_motion_is_read_by_a_refit_with_that_bend():
@@ -204,18 +147,3 @@ def test_beside_a_bend_what_shows_by_motion_is_read_by_a_refit_with_that_bend():
     shows = float(np.abs((whole.mean - here.mean) / here.noise).max())
     print(f"off by {worst:.2f}, shows by {shows:.0f}")
     assert shows > 10 and worst < 1
-
-
-def test_pixels_that_do_not_respond_are_none_of_the_spread():
-    """Of a fifth of the array, which a refit leaves out as well."""
-    dead = with_effect(MODEL, "dead_pixels", {"fraction": 0.2})
-    factors = [spread_factor(m, "gain", 0.02, (64, 64), 3) for m in (MODEL, dead)]
-    print(factors)
-    assert factors[1] == pytest.approx(factors[0], rel=0.1)
-
-
-def test_a_unit_has_moved_by_what_its_pixels_respond_more():
-    base = recorded().base
-    assert gain_change(base, base) == 0.0
-    assert gain_change(base, replace(base, gain=base.gain * 0.99)) == pytest.approx(-np.log(0.99))
-    assert gain_change(base, replace(base, gain=base.gain * 0.0)) == 0.0, "which do not respond at all tell nothing"

@@ -55,10 +55,6 @@ def test_in_the_dark_a_wave_hardly_passes_for_a_drift():
     assert slow["late 0"] < -2 * CONSTANCY < 2 * CONSTANCY < slow["late 7"]
 
 
-def test_few_intervals_tell_nothing():
-    assert lateness(at(np.array([10.0, 3000.0]))) == {}
-
-
 def test_a_change_of_all_pixels_is_no_variance_within_a_pixel():
     drifting = seen(recorded(effect("lamp_drift", sigma_per_root_s=0.3)))
     for flat in ("flat-0.2", "flat-0.65"):
@@ -80,17 +76,3 @@ def dark(late: np.ndarray, timed: int) -> SimpleNamespace:
         late=np.repeat(late * timed, 100) * frames,
         timed=(timed * frames).astype(np.int32),
     )
-
-
-@pytest.mark.parametrize("timed, stated", [(8, False), (19, True)])
-def test_a_part_of_a_hundred_intervals_has_a_mean(timed, stated):
-    """Eight pieces make a part."""
-    assert len(lateness(dark(np.zeros(64), timed))) == (PARTS if stated else 0)
-
-
-@pytest.mark.parametrize("error", [0.5e-4, 2e-4, 8e-4])
-def test_lateness_is_in_units_of_its_standard_error_where_that_is_above_two_in_ten_thousand(error):
-    """Pieces scatter by +- s about their part, whose mean then has the standard error s / sqrt(8)."""
-    pieces = 1e-3 + error * np.sqrt(8) * np.tile([1.0, -1.0], 32)
-    found = lateness(dark(pieces, 20))["late 3"]
-    assert found == pytest.approx(1e-3 / np.sqrt(1.0 + (error / 2e-4) ** 2), rel=1e-6)

@@ -38,14 +38,6 @@ def made_up(off: dict[tuple[str, str], float]) -> tuple[Null, np.ndarray]:
     return Null(keys, 0 * ones, ones, 0 * ones, np.inf, 100.0), np.array(list(off.values()))
 
 
-@pytest.mark.parametrize("noises, exponent", [(4.0, None), (6.0, 0.0)])
-def test_statistics_clearly_off_on_three_flats_give_an_exponent(noises: float, exponent: float | None) -> None:
-    null, off = made_up({("rates", flat): noises for flat in LEVELS})
-    kind = dict.fromkeys(LEVELS, "flat")
-    assert level_exponent(null, off, kind, LEVELS) == exponent
-    assert level_exponent(null, np.where(np.arange(3) == 0, 0.0, off), kind, LEVELS) is None, "two levels are no law"
-
-
 @pytest.mark.parametrize("rows, extent", [(8.0, "pixel by pixel"), (40.0, "common to many pixels")])
 def test_what_many_pixels_have_in_common_has_its_share_of_the_deviance(rows, extent, monkeypatch) -> None:
     """Of log(1 + 8) against two of log(1 + 10^2 / 8), 29 %; of log(1 + 40^2 / 8), 50 %."""
