@@ -127,29 +127,6 @@ def quiet(count: int) -> float:
     return float(stats.norm.isf(0.5e-3 / max(count, 1))) + 1.0
 
 
-def check_reveals(group: str, shown_by: Effect, where: str, names: Sequence[str], silent: Sequence[str] = ()) -> None:
-    """Statistics of a group are more than CLEAR off with an effect, and chance without.
-
-    Args:
-        group: of the statistics.
-        shown_by: the effect.
-        where: the recording.
-        names: of the statistics.
-        silent: recordings, or other groups, that the effect leaves alone: nothing of them is off.
-    """
-    with_it, without = seen(recorded(shown_by)), seen(recorded(seed=5))
-    for name in names:
-        key = StatisticKey(group, where, name)
-        print(f"{shown_by.name}: {where} {name} {with_it[key]:.1f}, without {without[key]:.1f}")
-        assert abs(with_it[key]) > CLEAR
-        assert abs(without[key]) < quiet(1)
-    alone = {k: abs(z) for k, z in with_it.items() if (k.group == group and k.recording in silent) or k.group in silent}
-    if silent:
-        worst = max(alone, key=lambda k: alone[k])
-        print(f"left alone: at worst {worst} {alone[worst]:.1f} of {len(alone)}, at most {quiet(len(alone)):.1f}")
-        assert alone[worst] < quiet(len(alone))
-
-
 def added_by(rounds: Sequence[Round]) -> list[Fit]:
     """The best of each round whose effect is in the last model."""
     last = {e.name for e in rounds[-1].model.effects}

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.special import polygamma
 
-from spikecam_env.gap.compare.pooled_variance import bias, moderated
+from spikecam_env.gap.compare.pooled_variance import bias, freedom_of_variance, moderated
 from spikecam_env.gap.statistics import StatisticKey
 
 FREEDOM = 11
@@ -69,3 +69,8 @@ def test_a_variance_that_stands_alone_or_is_zero_stays():
     made = np.append(drawn(np.ones(len(KEYS)), 6), [7.0, 0.0])
     found, freedom = moderated(keys, made, FREEDOM)
     assert list(found[-2:]) == [7.0, 0.0] and list(freedom[-2:]) == [FREEDOM, FREEDOM]
+
+
+def test_degrees_of_freedom_of_a_variance():
+    assert freedom_of_variance(0.0) == 2000.0
+    assert freedom_of_variance(float(polygamma(1, 5.5))) == pytest.approx(11.0)

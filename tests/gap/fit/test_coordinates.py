@@ -8,7 +8,7 @@ from dataclasses import fields
 import pytest
 from scipy import stats
 
-from spikecam_env.gap.fit.coordinates import SDS_OF_90_PERCENT, error_of, interval_of
+from spikecam_env.gap.fit.coordinates import SDS_OF_90_PERCENT, error_of, interval_of, is_apart, moved_value
 from spikecam_env.sensor import CATALOGUE
 
 PHASE = ("clock_feedthrough", "phase_frames")
@@ -56,3 +56,18 @@ def test_an_interval_never_leaves_the_range_of_its_parameter(name: str):
                 found = interval_of(name, field.name, float(value), share * max(abs(value), 0.1))
                 assert found is not None and all(low <= end <= max(most, value) for end in found), field.name
                 assert field.metadata["periodic"] or found[0] <= value <= found[1]
+
+
+def test_a_phase_wraps_where_its_bounds_are_the_same_moment():
+    assert moved_value(*PHASE, 0.95, 1.0) == pytest.approx(0.05)
+    assert moved_value(*PHASE, 0.0, -0.5) == pytest.approx(0.95)
+
+
+@pytest.mark.parametrize("one, other, apart", [(0.98, 0.02, False), (0.98, 0.04, True), (0.5, 0.52, False)])
+def test_phases_on_both_sides_of_zero_are_near(one: float, other: float, apart: bool):
+    assert is_apart(*PHASE, one, other, 0.05) is apart
+
+
+def test_values_of_other_signs_are_apart():
+    assert is_apart("clock_feedthrough", "amplitude_mV", -1.0, 1.0, 1e9)
+    assert not is_apart(*TAU, 6.0, 6.5, 1.0) and is_apart(*TAU, 6.0, 8.0, 1.0)

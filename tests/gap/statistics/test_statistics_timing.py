@@ -6,22 +6,12 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from small import SHAPE, check_reveals, effect, null
+from small import SHAPE, null
 
 from spikecam_env.gap.observe.conditions import Condition
 from spikecam_env.gap.observe.observation import observe
 from spikecam_env.gap.statistics.timing import statistics
 from spikecam_env.streams import pack_frames
-
-CASES = [
-    (effect("common_threshold_noise", sigma_mV=3.0), "flat-0.03", ["late"], []),
-    (effect("clock_jitter", sigma_ns=2000.0), "flat-0.65", ["late", "next"], []),
-]
-
-
-@pytest.mark.parametrize("shown_by, where, names, silent", CASES, ids=lambda v: getattr(v, "name", None))
-def test_timing_reveal(shown_by, where, names, silent):
-    check_reveals("timing", shown_by, where, names, silent)
 
 
 def test_a_few_slow_pixels_of_uneven_intervals_are_no_later_together_than_alone():
