@@ -10,7 +10,7 @@ from small import MODEL, unit
 
 from spikecam_env.gap.candidates.strength import with_effect
 from spikecam_env.gap.compare.prediction import Draw, Null, Prediction
-from spikecam_env.gap.fit.gauss_newton import Probe, derivatives, descend
+from spikecam_env.gap.fit.gauss_newton import Probe, descend
 from spikecam_env.gap.fit.problem import Problem
 from spikecam_env.gap.statistics import StatisticKey
 from spikecam_env.gap.unit.refit import BaseFit
@@ -67,21 +67,6 @@ def test_both_parameters_are_found_within_their_errors():
     for (_, key), error in zip(FREE, errors, strict=True):
         assert 0.001 < error < 0.1
         assert abs(np.log(found[key] / TRUE[key])) < 4 * error
-
-
-def test_what_one_parameter_moves_says_how_far_another_of_its_effect_does():
-    """Statistics that the time constant moves by less than is clear have its derivative too, and a doubt about it."""
-    n = null()
-
-    def weak(fraction: float, tau_us: float) -> np.ndarray:
-        return law(fraction, TRUE["tau_us"]) * (1.0 + 0.02 * np.log(tau_us / TRUE["tau_us"]) * (np.arange(COUNT) < 30))
-
-    model, probe = start(fraction=1.0, tau_us=1.0), probe_of(n, weak)
-    columns, noise = derivatives(problem_of(n, n.mean), probe, model, unit(), probe(model, unit()), FREE)
-    told = columns[:30, 1]
-    print(told[:3], noise[:3])
-    assert np.all(columns[:, 0] != 0) and 0.1 < np.median(told) < 0.6 and np.all(columns[30:, 1] == 0)
-    assert np.all(np.abs(noise[:, 1]) > 0)
 
 
 def test_where_steps_come_to_leave_more_the_best_is_kept():

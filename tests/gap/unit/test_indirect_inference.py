@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from small import MODEL, unit
 
-from spikecam_env.gap.unit.indirect_inference import extrapolated_unit, gain_change, has_converged, inferred_unit
+from spikecam_env.gap.unit.indirect_inference import extrapolated_unit, inferred_unit
 
 
 def test_a_unit_is_inferred_along_a_line_and_not_to_the_noise_of_each_pixel():
@@ -48,14 +48,6 @@ def test_a_pixel_without_gain_keeps_its_own(factor):
     gain[:2] = -1e-4 * base.gain[0], 0.0
     found = extrapolated_unit(base, replace(base, gain=gain), factor, 4.0)
     assert np.array_equal(found.gain[:2], base.gain[:2]) and np.isfinite(found.gain).all()
-
-
-@pytest.mark.parametrize("change, converged", [(2e-4, True), (-2e-4, True), (4.5e-4, False), (-4.5e-4, False)])
-def test_a_unit_has_converged_where_its_gain_changes_by_less_than_3e_4(change, converged):
-    base = unit()
-    there = replace(base, gain=(1 + change) * base.gain)
-    assert has_converged(base, there) == converged
-    assert gain_change(base, there) == pytest.approx(abs(change), rel=1e-3)
 
 
 @pytest.mark.parametrize("share, stays", [(0.35, True), (0.7, False)])
