@@ -4,16 +4,15 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from small import MODEL, effect, null, recorded
+from small import MODEL, effect, null, problem_of, recorded
 
 from spikecam_env.gap.candidates.strength import with_effect
 from spikecam_env.gap.candidates.table import candidate, chosen
 from spikecam_env.gap.candidates.table import testable as split_testable
-from spikecam_env.gap.compare.prediction import values_of
 from spikecam_env.gap.compare.step import scale_of
 from spikecam_env.gap.fit.candidate import fit
 from spikecam_env.gap.fit.predict import predict_by_twins
-from spikecam_env.gap.fit.problem import Problem, standing_on
+from spikecam_env.gap.fit.problem import standing_on
 from spikecam_env.gap.fit.recordings import recordings_affected
 from spikecam_env.gap.unit.refit import constrained_refit
 from spikecam_env.sensor import CATALOGUE
@@ -54,13 +53,10 @@ def test_fit_of_the_true_effect_finds_its_strength_from_half_or_twice_of_it(star
     """Lag of 8 %, the time constant free; the fit leaves about as much as chance."""
     true = effect("photodiode_lag", fraction=0.08, tau_us=1000.0)
     case = recorded(true)
-    measured = values_of(case.bank, null().keys)
-    found = fit(
-        Problem(case, MODEL, null(), measured, measured), "photodiode_lag", {"fraction": 0.08 * start, "tau_us": 1000.0}
-    )
-    print(found.parameters, found.sd, f"misfit {found.misfit:.0f} of {len(measured)}")
+    found = fit(problem_of(case, null()), "photodiode_lag", {"fraction": 0.08 * start, "tau_us": 1000.0})
+    print(found.parameters, found.sd, f"misfit {found.misfit:.0f} of {len(null().keys)}")
     assert found.parameters["fraction"] == pytest.approx(0.08, rel=0.15)
-    assert found.misfit < 1.5 * len(measured)
+    assert found.misfit < 1.5 * len(null().keys)
     assert found.model.effects[-1].name == "photodiode_lag" or "photodiode_lag" in {e.name for e in found.model.effects}
 
 

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from small import MODEL, TWINS, effect, null, recorded
+from small import MODEL, TWINS, effect, null, problem_of, recorded
 
 from spikecam_env.gap.baseline.null_model import model_null
 from spikecam_env.gap.candidates.strength import MOST_EXTRAPOLATED, with_effect
@@ -26,9 +26,10 @@ def test_a_weak_effect_is_told_by_louder_twins_as_well_as_by_many():
     case = recorded(effect("dead_time", tau_us=0.02))
     without = model_null(case, MODEL, TWINS)
     measured = values_of(case.bank, without.keys)
-    found = fit(Problem(case, MODEL, without, measured, measured), "dead_time", {"tau_us": 0.02})
+    problem = problem_of(case, without)
+    found = fit(problem, "dead_time", {"tau_us": 0.02})
     size = effect_size(without, measured, found.prediction.mean - without.mean)
-    loud, times = amplified_fit(Problem(case, MODEL, without, measured, measured), found, "dead_time")
+    loud, times = amplified_fit(problem, found, "dead_time")
     assert 1 < times <= MOST_EXTRAPOLATED and loud.parameters == found.parameters
     which = [i for i, c in enumerate(case.conditions) if c.use == "fit"]
     many = predict_by_twins(case, found.model, found.base, without, TWINS, which)
@@ -61,8 +62,7 @@ def test_more_twins_say_whether_something_is_left_where_two_cannot():
     """Statistics 50 noises off: by two twins that happened to scatter by four this is chance, by all twelve it is not.
     A good fit needs no more twins."""
     case, without = recorded(effect("dead_time", tau_us=0.5)), null()
-    measured = values_of(case.bank, without.keys)
-    found = fit(Problem(case, MODEL, without, measured, measured), "dead_time", {"tau_us": 0.5})
+    found = fit(problem_of(case, without), "dead_time", {"tau_us": 0.5})
     two = predict_by_twins(case, found.model, found.base, without, 2)
     found = replace(found, prediction=replace(two, spread=4.0 * without.sd))
     suits = found.prediction.mean

@@ -6,27 +6,19 @@ from collections.abc import Callable
 from types import SimpleNamespace
 
 import numpy as np
-from small import MODEL, unit
+from small import MODEL, TWINS, made_up_null, unit
 
 from spikecam_env.gap.candidates.strength import with_effect
 from spikecam_env.gap.compare.prediction import Draw, Null, Prediction
 from spikecam_env.gap.fit.gauss_newton import Probe, descend
 from spikecam_env.gap.fit.problem import Problem
-from spikecam_env.gap.statistics import StatisticKey
 from spikecam_env.gap.unit.refit import BaseFit
 from spikecam_env.sensor import SensorModel
 
-COUNT, TWINS = 60, 12
+COUNT = 60
 NAME = "incomplete_reset"
 TRUE = {"fraction": 0.02, "tau_us": 300.0}
 FREE = [(NAME, key) for key in TRUE]
-
-
-def null() -> Null:
-    values = np.random.default_rng(0).standard_normal((TWINS, COUNT))
-    draws = tuple(Draw(n, v, None) for n, v in enumerate(values))
-    keys = tuple(StatisticKey("rates", "r", str(i)) for i in range(COUNT))
-    return Null(keys, values.mean(axis=0), values.std(axis=0, ddof=1), np.zeros(COUNT), TWINS, TWINS - 1, draws=draws)
 
 
 def problem_of(n: Null, measured: np.ndarray) -> Problem:
@@ -58,7 +50,7 @@ def parameters_of(model: SensorModel) -> dict[str, float]:
 
 
 def test_both_parameters_are_found_within_their_errors():
-    n = null()
+    n = made_up_null(COUNT)
     measured = n.mean + law(**TRUE) + n.sd * np.random.default_rng(1).standard_normal(COUNT)
     end = descend(problem_of(n, measured), probe_of(n, law), start(fraction=0.6, tau_us=2.0), unit(), FREE)
     found = parameters_of(end.model)
@@ -71,7 +63,7 @@ def test_both_parameters_are_found_within_their_errors():
 
 def test_where_steps_come_to_leave_more_the_best_is_kept():
     """A law that promises more of the fraction, and turns round where the step leads."""
-    n = null()
+    n = made_up_null(COUNT)
     here = 0.5 * TRUE["fraction"]
 
     def broken(fraction: float, tau_us: float) -> np.ndarray:

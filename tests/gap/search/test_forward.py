@@ -4,29 +4,21 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from small import MODEL, recorded, unit
+from small import MODEL, TWINS, made_up_null, recorded, unit
 
 from spikecam_env.gap.compare.distance import residual_and_misfit
-from spikecam_env.gap.compare.prediction import Draw, Null, Prediction
+from spikecam_env.gap.compare.prediction import Null, Prediction
 from spikecam_env.gap.fit.candidate import Fit
 from spikecam_env.gap.fit.problem import Problem
 from spikecam_env.gap.search.choice import chosen_of
 from spikecam_env.gap.search.rivals import is_rival, lead
 from spikecam_env.gap.settings import Deviance
-from spikecam_env.gap.statistics import StatisticKey
 
 DEVIANCE = Deviance()
 
-COUNT, TWINS = 200, 12
+COUNT = 200
 FIT = np.arange(COUNT) < 150
 """Statistics of the recordings to fit; the others are held out."""
-
-
-def null() -> Null:
-    values = np.random.default_rng(0).standard_normal((TWINS, COUNT))
-    draws = tuple(Draw(n, v, None) for n, v in enumerate(values))
-    keys = tuple(StatisticKey("rates", "r", str(i)) for i in range(COUNT))
-    return Null(keys, values.mean(axis=0), values.std(axis=0, ddof=1), np.zeros(COUNT), TWINS, TWINS - 1, draws=draws)
 
 
 def a_fit(n: Null, name: str, change, seen) -> Fit:
@@ -37,7 +29,7 @@ def a_fit(n: Null, name: str, change, seen) -> Fit:
 
 def campaign():
     """An effect of 4 noises on 50 statistics to fit and on all that are held out."""
-    n = null()
+    n = made_up_null(COUNT)
     effect = np.where((np.arange(COUNT) < 50) | ~FIT, 4.0, 0.0)
     values = n.mean + effect + n.sd * np.random.default_rng(1).standard_normal(COUNT)
     return n, effect, values, np.where(FIT, values, np.nan)

@@ -3,22 +3,15 @@
 from __future__ import annotations
 
 import numpy as np
+from small import TWINS, made_up_null
 
-from spikecam_env.gap.compare.prediction import Draw, Null, Prediction
+from spikecam_env.gap.compare.prediction import Null, Prediction
 from spikecam_env.gap.search.rivals import is_rival, lead
 from spikecam_env.gap.settings import Deviance
-from spikecam_env.gap.statistics import StatisticKey
 
 TIE = Deviance().tie
 
-COUNT, TWINS = 200, 12
-
-
-def null(seed: int) -> Null:
-    values = np.random.default_rng(seed).standard_normal((TWINS, COUNT))
-    keys = tuple(StatisticKey("rates", "r", str(i)) for i in range(COUNT))
-    draws = tuple(Draw(n, v, None) for n, v in enumerate(values))
-    return Null(keys, values.mean(axis=0), values.std(axis=0, ddof=1), np.zeros(COUNT), TWINS, TWINS - 1, draws=draws)
+COUNT = 200
 
 
 def shown(n: Null, change: np.ndarray) -> Prediction:
@@ -30,7 +23,7 @@ def share_of_rivals(apart: float, cases: int = 60) -> float:
     half of the statistics, and `apart` noises apart on ten others."""
     found = 0
     for seed in range(cases):
-        n = null(seed)
+        n = made_up_null(COUNT, seed=seed)
         common = np.where(np.arange(COUNT) < 100, 3.0, 0.0)
         other = common + np.where(np.arange(COUNT) >= 190, apart, 0.0)
         measured = other + np.random.default_rng([seed, 1]).standard_normal(COUNT)
@@ -46,7 +39,7 @@ def test_the_true_effect_is_nearly_always_a_rival_of_a_wrong_one():
 
 
 def test_a_wrong_effect_is_no_rival_of_the_true_one_when_it_is_far():
-    n = null(0)
+    n = made_up_null(COUNT, seed=0)
     change = np.where(np.arange(COUNT) < 100, 3.0, 0.0)
     wrong = np.where(np.arange(COUNT) >= 100, 3.0, 0.0)
     measured = n.mean + change + np.random.default_rng(1).standard_normal(COUNT)
@@ -55,7 +48,7 @@ def test_a_wrong_effect_is_no_rival_of_the_true_one_when_it_is_far():
 
 
 def test_two_that_predict_the_same_are_rivals_whichever_leads():
-    n = null(0)
+    n = made_up_null(COUNT, seed=0)
     change = np.where(np.arange(COUNT) < 100, 3.0, 0.0)
     measured = n.mean + change
     one, two = shown(n, change), shown(n, 1.001 * change)
@@ -74,7 +67,7 @@ def test_two_laws_that_do_the_same_are_rivals_though_twins_differ():
     At 1 % doubt two of 200 are missed, and some more because twins also scatter further than CLEAR."""
     missed = leads = 0
     for seed in range(200):
-        n = null(seed)
+        n = made_up_null(COUNT, seed=seed)
         change = np.where(np.arange(COUNT) < 100, 3.0, 0.0)
         one, other = (simulated(n, change, seed=1000 * i + seed) for i in (1, 2))
         measured = n.mean + change + np.random.default_rng([seed, 1]).standard_normal(COUNT)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import replace
 
 import numpy as np
@@ -26,12 +25,6 @@ from spikecam_env.gap.verdict.verdict import conclude
 PER_EFFECT = DiagnosisSettings().searching.campaigns_per_effect
 
 
-def test_nothing_is_left_out_while_there_is_less_than_the_most():
-    budget = Budget(20, [13, 6])
-    assert budget.allows("a third effect") and budget.simulated == 19
-    assert budget.left_out == [] and unfinished(budget) == []
-
-
 def test_a_skipped_step_is_noted_once():
     budget = Budget(20, [13, 7])
     assert not budget.allows("a third effect") and not budget.allows("a third effect")
@@ -46,27 +39,6 @@ def test_skipped_refinements_are_noted_to_widen_intervals():
     (said,) = unfinished(Budget(20, [20], ["finer strengths"]))
     (other,) = unfinished(Budget(20, [20], ["a third effect"]))
     assert said.endswith("Intervals are wider for it.") and "wider" not in other
-
-
-def test_a_step_over_the_rest_of_the_budget_does_not_begin():
-    budget = Budget(20, [13])
-    assert budget.allows("photodiode_lag of another shape", 6) and budget.left_out == []
-    assert not budget.allows("photodiode_lag of another shape", 7)
-    assert budget.left_out == ["photodiode_lag of another shape"]
-
-
-def test_a_step_that_a_verdict_needs_may_take_more():
-    budget = Budget(20, [13])
-    assert budget.allows("a second effect", 12, needed=True) and not budget.allows("a second effect", 13, needed=True)
-
-
-def test_a_verdict_that_is_settled_can_do_without_all():
-    budget = Budget(20, [20], verdict_known=True)
-    assert not budget.allows("a second effect", needed=True) and budget.left_out == ["a second effect"]
-
-
-def test_without_a_most_there_is_no_end():
-    assert Budget(math.inf, [10**9]).allows("a third effect")
 
 
 def test_the_command_asks_for_what_the_function_does():
