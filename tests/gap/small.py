@@ -109,7 +109,7 @@ def made_up_null(count: int, twins: int = TWINS, seed: int = 0) -> Null:
 
 
 def problem_of(case: Case, null: Null) -> Problem:
-    """The search for what a case has beyond a null model, where all of its statistics are to be fitted."""
+    """A search in a case against a null model, where all of its statistics are to be fitted."""
     measured = values_of(case.bank, null.keys)
     return Problem(case, MODEL, null, measured, measured)
 

@@ -1,4 +1,4 @@
-"""Limits of the sensor's numbers: what lies beyond one is refused by name."""
+"""Limits of the sensor's numbers: a value beyond one is refused by name."""
 
 from __future__ import annotations
 
