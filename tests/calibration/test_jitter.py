@@ -5,7 +5,6 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from spikecam_env.calibration import jitter
 from spikecam_env.calibration.jitter import fit_jitter, second_difference
 from spikecam_env.calibration.spike_times import spike_times
 from spikecam_env.sensor import CATALOGUE, SensorModel, SpikeSensor
@@ -81,27 +80,3 @@ def test_slow_noise_is_told_from_white() -> None:
     fit = fit_jitter(times.steps, times.square[None], times.terms[None].astype(float), times.rate[None])
     print(f"slow {fit.slow:.3g} +- {fit.slow_sd:.1g}")
     assert fit.slow_fitted
-
-
-@pytest.mark.parametrize("slow", [True, False])
-def test_a_fit_whose_steps_go_to_and_fro_ends_soon_and_where_plain_ones_would(slow, monkeypatch) -> None:
-    """Dim light twenty times as noisy as bright: plain steps turn back by half, some twenty times."""
-    steps = np.array([1, 2, 4, 8, 16, 32, 64])
-    rate = np.array([0.003, 0.01, 0.03, 0.1, 0.3])[:, None] * np.random.default_rng(0).normal(1.0, 0.03, (5, 400))
-    interval = (1.0 / rate)[..., None]
-    terms = np.maximum(8000.0 / interval - 2 * steps, 0.0)
-    noise = (1e-3, 1e-3, 5e-5, 5e-5, 5e-5)
-    square = terms * np.stack([second_difference(steps, t, w) for t, w in zip(interval, noise, strict=True)])
-    asked: list[float] = []
-    law = jitter._quantisation
-    monkeypatch.setattr(jitter, "_quantisation", lambda read, white: asked.append(white) or law(read, white))
-    found = jitter._fit(steps, square, terms, interval, slow=slow)
-    turns = len(asked)
-    monkeypatch.undo()
-    expected = second_difference(steps, interval, found.white, found.slow)
-    weight = 1.0 / (steps * np.maximum(expected, 0.05) ** 2)
-    shape = 2 * steps * interval**2
-    score = float((weight * shape * (square - terms * expected)).sum() / (weight * shape * shape * terms).sum())
-    print(f"{turns} turns to {found.white:.4g}; a plain step would be {score:.1e}")
-    assert turns <= 12
-    assert abs(score) < 1e-5 * found.white

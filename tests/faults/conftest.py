@@ -7,12 +7,27 @@ from pathlib import Path
 
 import pytest
 
-from tests.faults.writing import inputs_in
+from tests.commands import said
+from tests.faults.writing import EndsInALine, inputs_in
 
 
 @pytest.fixture(scope="session")
 def inputs(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
     return inputs_in(tmp_path_factory.mktemp("inputs"))
+
+
+@pytest.fixture
+def ends_in_a_line(inputs: dict[str, Path], monkeypatch: pytest.MonkeyPatch, capsys) -> EndsInALine:
+    """Runs a command that writes to a place: it ends with code 2 and one line, which is returned."""
+
+    def line_of(write: Callable[..., int], out: Path) -> str:
+        capsys.readouterr()
+        code = write(out, inputs, monkeypatch)
+        lines = said(capsys.readouterr().err)
+        assert code == 2 and len(lines) == 1 and lines[0].startswith("spikecam: "), (code, lines)
+        return lines[0]
+
+    return line_of
 
 
 @pytest.fixture

@@ -7,8 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.commands import said
-from tests.faults.writing import WRITINGS, tree
+from tests.faults.writing import WRITINGS, EndsInALine, tree
 
 
 def missing(folder: Path, name: str, is_file: bool) -> Path:
@@ -42,29 +41,23 @@ PLACES: dict[str, Callable[[Path, str, bool], Path]] = {
 
 @pytest.mark.parametrize("command", WRITINGS)
 def test_every_command_refuses_every_impossible_place_in_a_line(
-    command: str, tmp_path: Path, inputs: dict[str, Path], monkeypatch: pytest.MonkeyPatch, capsys
+    command: str, tmp_path: Path, ends_in_a_line: EndsInALine
 ) -> None:
     writing = WRITINGS[command]
-    capsys.readouterr()
     for name, place in PLACES.items():
         folder = tmp_path / name
         folder.mkdir()
         out = place(folder, writing.out, writing.is_file)
         before = tree(folder)
-        code = writing.refused(out, inputs, monkeypatch)
-        lines = said(capsys.readouterr().err)
-        assert code == 2, (name, lines)
-        assert len(lines) == 1 and lines[0].startswith("spikecam: ") and len(lines[0]) < 1000, (name, lines)
+        print(name)
+        assert len(ends_in_a_line(writing.refused, out)) < 1000, name
         assert tree(folder) == before, name
 
 
 @pytest.mark.parametrize("command", WRITINGS)
 def test_every_command_refuses_a_read_only_folder_in_a_line(
-    command: str, read_only: Path, inputs: dict[str, Path], monkeypatch: pytest.MonkeyPatch, capsys
+    command: str, read_only: Path, ends_in_a_line: EndsInALine
 ) -> None:
     writing = WRITINGS[command]
-    capsys.readouterr()
-    assert writing.refused(read_only / writing.out, inputs, monkeypatch) == 2
-    lines = said(capsys.readouterr().err)
-    assert len(lines) == 1 and lines[0].startswith("spikecam: ") and writing.out in lines[0], lines
+    assert writing.out in ends_in_a_line(writing.refused, read_only / writing.out)
     assert not tree(read_only)

@@ -10,8 +10,7 @@ from types import SimpleNamespace
 
 import pytest
 
-from tests.commands import said
-from tests.faults.writing import WRITINGS, files_up_to, tree
+from tests.faults.writing import WRITINGS, EndsInALine, files_up_to, tree
 
 PAGE = 4096
 """Bytes."""
@@ -25,7 +24,7 @@ def test_a_disk_that_fills_up_ends_every_command_in_a_line(
     disk: Callable[[int], Path],
     inputs: dict[str, Path],
     monkeypatch: pytest.MonkeyPatch,
-    capsys,
+    ends_in_a_line: EndsInALine,
 ) -> None:
     writing = WRITINGS[command]
     assert writing.run(tmp_path / writing.out, inputs, monkeypatch) == 0
@@ -39,13 +38,9 @@ def test_a_disk_that_fills_up_ends_every_command_in_a_line(
     monkeypatch.setattr("shutil.disk_usage", lambda _: roomy)
     for size in sizes:
         folder = disk(size)
-        capsys.readouterr()
-        code = writing.run(folder / writing.out, inputs, monkeypatch)
-        printed = capsys.readouterr()
-        lines = said(printed.err)
-        print(f"{command}: {size} bytes, {lines[-1:]}")
-        assert code == 2, lines
-        assert len(lines) == 1 and lines[0].startswith("spikecam: ") and "full" in lines[0], lines
+        line = ends_in_a_line(writing.run, folder / writing.out)
+        print(f"{command}: {size} bytes, {line}")
+        assert "full" in line
         left = tree(folder)
         assert not any("partial" in name for name in left), left
         assert writing.resumes or not left, left
@@ -53,26 +48,22 @@ def test_a_disk_that_fills_up_ends_every_command_in_a_line(
 
 @pytest.mark.parametrize("command", ["record h5", "record dat", "film", "dataset"])
 def test_what_a_disk_has_no_room_for_is_refused_before_the_work(
-    command: str, tmp_path: Path, inputs: dict[str, Path], monkeypatch: pytest.MonkeyPatch, capsys
+    command: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, ends_in_a_line: EndsInALine
 ) -> None:
     monkeypatch.setattr("shutil.disk_usage", lambda _: SimpleNamespace(free=100))
-    assert WRITINGS[command].run(tmp_path / WRITINGS[command].out, inputs, monkeypatch) == 2
-    lines = said(capsys.readouterr().err)
-    assert len(lines) == 1 and "on disk" in lines[0] and "100 bytes free" in lines[0], lines
+    line = ends_in_a_line(WRITINGS[command].run, tmp_path / WRITINGS[command].out)
+    assert "on disk" in line and "100 bytes free" in line
     assert not tree(tmp_path)
 
 
 @pytest.mark.parametrize("command", WRITINGS)
 def test_a_limit_on_the_size_of_files_ends_every_command_in_a_line(
-    command: str, tmp_path: Path, inputs: dict[str, Path], monkeypatch: pytest.MonkeyPatch, capsys
+    command: str, tmp_path: Path, ends_in_a_line: EndsInALine
 ) -> None:
     writing = WRITINGS[command]
-    capsys.readouterr()
     with files_up_to(100):
-        code = writing.run(tmp_path / writing.out, inputs, monkeypatch)
-    lines = said(capsys.readouterr().err)
-    assert code == 2, lines
-    assert len(lines) == 1 and lines[0].startswith("spikecam: ") and "ulimit" in lines[0], lines
+        line = ends_in_a_line(writing.run, tmp_path / writing.out)
+    assert "ulimit" in line
     left = tree(tmp_path)
     assert not any("partial" in name for name in left), left
     assert writing.resumes or not left, left

@@ -22,7 +22,7 @@ from spikecam_env.locks import VARIABLE, lock
 from spikecam_env.run_folder import alone_in
 from spikecam_env.streams import read_recording
 from tests.commands import said
-from tests.faults.writing import SMALL, WRITINGS, python, tree
+from tests.faults.writing import SMALL, WRITINGS, EndsInALine, python, tree
 
 RUNS = [name for name, writing in WRITINGS.items() if writing.resumes]
 NUMBERS = [errno.ENOLCK, errno.EOPNOTSUPP, errno.ENOSYS, errno.EINVAL]
@@ -113,14 +113,11 @@ def test_a_run_that_can_have_no_lock_says_so_and_what_to_set(
     command: str,
     no_flock: None,
     tmp_path: Path,
-    inputs: dict[str, Path],
-    monkeypatch: pytest.MonkeyPatch,
-    capsys: pytest.CaptureFixture[str],
+    ends_in_a_line: EndsInALine,
 ) -> None:
     writing = WRITINGS[command]
-    assert writing.refused(tmp_path / writing.out, inputs, monkeypatch) == 2
-    lines = said(capsys.readouterr().err)
-    assert len(lines) == 1 and "no locks" in lines[0] and VARIABLE in lines[0] and "at work" not in lines[0], lines
+    line = ends_in_a_line(writing.refused, tmp_path / writing.out)
+    assert "no locks" in line and VARIABLE in line and "at work" not in line
     assert not tree(tmp_path)
 
 
@@ -139,19 +136,14 @@ def test_where_locks_may_be_missing_a_run_begins_with_one_warning(
 
 @pytest.mark.parametrize("command", RUNS)
 def test_a_second_run_in_a_folder_is_refused_in_a_line(
-    command: str,
-    tmp_path: Path,
-    inputs: dict[str, Path],
-    monkeypatch: pytest.MonkeyPatch,
-    capsys: pytest.CaptureFixture[str],
+    command: str, tmp_path: Path, ends_in_a_line: EndsInALine
 ) -> None:
     writing = WRITINGS[command]
     out = tmp_path / writing.out
     out.mkdir()
     with alone_in(out):
-        assert writing.refused(out, inputs, monkeypatch) == 2
-    lines = said(capsys.readouterr().err)
-    assert len(lines) == 1 and "another run is at work" in lines[0] and str(out) in lines[0], lines
+        line = ends_in_a_line(writing.refused, out)
+    assert "another run is at work" in line and str(out) in line
     assert not tree(out)
 
 

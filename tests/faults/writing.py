@@ -29,6 +29,8 @@ from spikecam_env.sensor import SensorModel
 SMALL = ("--size", "24", "40")
 Work = dict[str, Callable[..., object]]
 """Stand-ins for work: `module:name` -> function."""
+EndsInALine = Callable[[Callable[..., int], Path], str]
+"""The fixture of that name: (`Writing.run` or `refused`, a place) -> the line."""
 
 
 @dataclass(frozen=True)

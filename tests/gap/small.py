@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 from functools import lru_cache
-from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,11 +13,10 @@ from scipy import stats
 from spikecam_env.gap import Bars, Dark, Flat, Step
 from spikecam_env.gap.baseline.null_model import model_null
 from spikecam_env.gap.compare.distance import deviates
-from spikecam_env.gap.compare.prediction import Null, values_of
-from spikecam_env.gap.fit.candidate import Fit
+from spikecam_env.gap.compare.prediction import Draw, Null, values_of
+from spikecam_env.gap.fit.problem import Problem
 from spikecam_env.gap.observe.conditions import Condition, planned_conditions
 from spikecam_env.gap.observe.observation import ObservedRecording, observe
-from spikecam_env.gap.search.round import Round
 from spikecam_env.gap.statistics import StatisticKey
 from spikecam_env.gap.twins.case import Case, case_of
 from spikecam_env.gap.twins.simulate import expose
@@ -102,6 +100,20 @@ def null() -> Null:
     return model_null(recorded(seed=2), MODEL, TWINS)
 
 
+def made_up_null(count: int, twins: int = TWINS, seed: int = 0) -> Null:
+    """So many statistics of rates, of normal noise of deviation 1, as twins tell them."""
+    values = np.random.default_rng(seed).standard_normal((twins, count))
+    keys = tuple(StatisticKey("rates", "r", str(i)) for i in range(count))
+    draws = tuple(Draw(n, v, None) for n, v in enumerate(values))
+    return Null(keys, values.mean(axis=0), values.std(axis=0, ddof=1), np.zeros(count), twins, twins - 1, draws=draws)
+
+
+def problem_of(case: Case, null: Null) -> Problem:
+    """A search in a case against a null model, where all of its statistics are to be fitted."""
+    measured = values_of(case.bank, null.keys)
+    return Problem(case, MODEL, null, measured, measured)
+
+
 def seen(case: Case) -> dict[StatisticKey, float]:
     """Every statistic of a case as a normal deviate from the model without effects."""
     n = null()
@@ -125,33 +137,3 @@ def summary(z: dict[StatisticKey, float]) -> str:
 def quiet(count: int) -> float:
     """|z| that `count` normal deviates exceed once in a thousand times, with room for a null of TWINS twins."""
     return float(stats.norm.isf(0.5e-3 / max(count, 1))) + 1.0
-
-
-def check_reveals(group: str, shown_by: Effect, where: str, names: Sequence[str], silent: Sequence[str] = ()) -> None:
-    """Statistics of a group are more than CLEAR off with an effect, and chance without.
-
-    Args:
-        group: of the statistics.
-        shown_by: the effect.
-        where: the recording.
-        names: of the statistics.
-        silent: recordings, or other groups, that the effect leaves alone: nothing of them is off.
-    """
-    with_it, without = seen(recorded(shown_by)), seen(recorded(seed=5))
-    for name in names:
-        key = StatisticKey(group, where, name)
-        print(f"{shown_by.name}: {where} {name} {with_it[key]:.1f}, without {without[key]:.1f}")
-        assert abs(with_it[key]) > CLEAR
-        assert abs(without[key]) < quiet(1)
-    alone = {k: abs(z) for k, z in with_it.items() if (k.group == group and k.recording in silent) or k.group in silent}
-    if silent:
-        worst = max(alone, key=lambda k: alone[k])
-        print(f"left alone: at worst {worst} {alone[worst]:.1f} of {len(alone)}, at most {quiet(len(alone)):.1f}")
-        assert alone[worst] < quiet(len(alone))
-
-
-def added_by(rounds: Sequence[Round]) -> list[Fit]:
-    """The best of each round whose effect is in the last model."""
-    last = {e.name for e in rounds[-1].model.effects}
-    added = [r.fits[0] for r, after in pairwise(rounds) if after.model is not r.model]
-    return [found for found in added if found.name in last]

@@ -1,94 +1,34 @@
-"""Every setting of a diagnosis decides something: at half and at twice its value, a decision is another.
+"""Settings of a diagnosis: each is declared, listed and checked, and those of one decision decide it.
 
-A probe is a function (settings, monkeypatch) -> a decision of the diagnosis, on made-up statistics on either side of
-the default.
+The others decide in a whole diagnosis, whose tests have the defaults alone.
 """
 
 from __future__ import annotations
 
 from dataclasses import replace
-from itertools import chain, repeat
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from made_up import named
-from made_up_labels import wrong_labels
 from scipy import stats
-from scripted import COUNT, TWINS, found_at, null, scripted, some_fit
-from small import MODEL, SHAPE, unit
+from small import MODEL, unit
 
 from spikecam_env.errors import InputError
 from spikecam_env.gap.baseline import motion
 from spikecam_env.gap.baseline.alarm import is_discrepant
 from spikecam_env.gap.baseline.off_nominal import off_nominal
-from spikecam_env.gap.compare.distance import is_significant, loss
+from spikecam_env.gap.compare.distance import is_significant
+from spikecam_env.gap.compare.prediction import Null
 from spikecam_env.gap.diagnose import diagnose, read_case
-from spikecam_env.gap.fit import predict
-from spikecam_env.gap.fit.confirm import confirmed
-from spikecam_env.gap.maps import conclude as maps_conclude
 from spikecam_env.gap.maps import diagnose_maps
-from spikecam_env.gap.maps import search as maps_search
-from spikecam_env.gap.maps.search import MapFit, PatternModel, search_maps
 from spikecam_env.gap.report.page import report
 from spikecam_env.gap.screen.screen import Screened
-from spikecam_env.gap.search import rivals, shortlist
-from spikecam_env.gap.search.round import is_improvement
+from spikecam_env.gap.search import shortlist
 from spikecam_env.gap.settings import CONSTANTS, Deviance, DiagnosisSettings, every_setting
 from spikecam_env.gap.statistics import StatisticKey
-from spikecam_env.gap.twins.budget import Budget
-from spikecam_env.gap.verdict.bounds import bounds
 from spikecam_env.gap.verdict.remainder import explains
 from spikecam_env.gap.verdict.verdict import may_be_chance
-
-ELSEWHERE = {
-    "searching.most_effects",  # compare/test_thresholds.py: a later effect has to remove 4
-    "searching.campaigns_per_effect",  # search/test_forward.py: a second effect within the budget
-    "bounding.resolution",  # verdict/test_bounds.py: the least refuted strength is bracketed
-}
-"""Settings that other tests look at."""
-
-PROBES: dict = {}
-NOTHING = np.zeros(1)
-
-
-def probe_of(name: str):
-    """Registers a probe of a setting."""
-    return lambda function: PROBES.setdefault(name, function)
-
-
-def beside(value: float) -> tuple[float, float]:
-    """A little less than a default, and a little more."""
-    return 0.75 * value, 1.5 * value
-
-
-def changes_of(field) -> list:
-    """A setting at half and at twice its value, as far as its range goes."""
-    value = field.default
-    least, most = field.metadata["range"]
-    return (
-        [max(value // 2, least, 1), 2 * value]
-        if isinstance(value, int)
-        else [max(value / 2, least), min(2 * value, most)]
-    )
-
-
-CASES = [
-    pytest.param(f"{stage}.{name}", changed, id=f"{stage}.{name}-{('half', 'twice')[i]}")
-    for stage, name, field in every_setting()
-    if f"{stage}.{name}" not in ELSEWHERE
-    for i, changed in enumerate(changes_of(field))
-]
-
-
-@pytest.mark.parametrize("name, changed", CASES)
-def test_a_setting_at_half_or_twice_its_value_decides_otherwise(name, changed):
-    decisions = []
-    for settings in (DiagnosisSettings(), DiagnosisSettings.of({name: changed})):
-        with pytest.MonkeyPatch.context() as patch:
-            decisions.append(PROBES[name](settings, patch))
-    print(f"{name}: {decisions[0]}, at {changed} {decisions[1]}")
-    assert decisions[0] != decisions[1]
 
 
 def test_every_setting_has_a_unit_a_meaning_and_a_source():
@@ -132,161 +72,60 @@ def test_a_diagnosis_states_settings_that_are_not_the_defaults():
     assert "deviance.tie = 8.0" in report(changed)
 
 
-def exact(settings, keys):
-    """Statistics whose noise is known to be 1."""
-    n = len(keys)
-    return replace(null(settings), keys=keys, mean=np.zeros(n), sd=np.ones(n), floor=np.zeros(n),
-                   twins=1_000_000, freedom=1e9, draws=())  # fmt: skip
-
-
 ONE = (StatisticKey("rates", "r", "0"),)
-PLACES = (*(StatisticKey("rates", "a", str(n)) for n in range(100)), StatisticKey("drift", "b", "0"))
-"""A hundred statistics of one place, and one of another."""
 
 
-@probe_of("deviance.accept")
-def _(settings, patch):
-    return [is_improvement(null(settings), 100.0, some_fit("dead_time", 100.0 - r), False) for r in beside(12.0)]
+def known(settings: DiagnosisSettings, keys: tuple[StatisticKey, ...] = ONE) -> Null:
+    """Statistics whose mean is 0 and whose noise is known to be 1."""
+    zero = np.zeros(len(keys))
+    return Null(keys, zero, zero + 1.0, zero, 1_000_000, 1e9, settings=settings)
 
 
-@probe_of("deviance.tie")
-def _(settings, patch):
-    """Leads beside draws by which no lead at all would be chance."""
-    decisions, n = [], null(settings)
-    for lead in beside(6.0):
-        leads = chain([lead], np.random.default_rng(0).normal(-50.0, 1.0, TWINS))
-        patch.setattr(rivals, "lead", lambda *_, of=leads: next(of))
-        decisions.append(rivals.is_rival(n, n.draws, n.mean, n.prediction, n.prediction))
-    return decisions
+def off_by_p(p: float) -> np.ndarray:
+    """(1,) a statistic off by the normal deviate of a two-sided p."""
+    return np.array([stats.norm.isf(p / 2)])
 
 
-@probe_of("judging.alarm")
-def _(settings, patch):
-    return [is_discrepant(exact(settings, ONE), np.array([stats.norm.isf(p / 2)])) for p in beside(0.02)]
-
-
-@probe_of("judging.gate")
-def _(settings, patch):
-    return [is_significant(exact(settings, ONE), np.array([stats.norm.isf(p / 2)])) for p in beside(0.005)]
-
-
-@probe_of("judging.chance_p")
-def _(settings, patch):
-    return [may_be_chance(SimpleNamespace(smallest_p=p, null=null(settings)), []) for p in beside(0.002)]
-
-
-@probe_of("baseline.least_error")
-def _(settings, patch):
-    return [wrong_labels("flat-4", off, settings=settings) for off in beside(1e-3)]
-
-
-@probe_of("baseline.least_contrast")
-def _(settings, patch):
-    """A window of 16 pixels, a share of whose million spikes is missing beyond chance."""
-    expected = np.full((1, 4, 4), 1e6 / 16)
-    planes = [(-c * expected, -c * expected, np.full((1, 4, 4), 1e-9), expected) for c in beside(0.05)]
-    return [bool([*motion.beyond(p, (4, 4), 1, 0.0, 5.0, settings.baseline)]) for p in planes]
-
-
-@probe_of("baseline.false_alarm")
-def _(settings, patch):
-    return round(motion.least_deviate(1000, settings.baseline), 6)
-
-
-@probe_of("unit.usual")
-def _(settings, patch):
-    case, base = SimpleNamespace(scenes_only=False, settings=settings), unit()
-    units = [replace(base, dark=factor * base.dark) for factor in beside(1.8)]
-    return ["dark_current" in off_nominal(case, MODEL, one).parameters for one in units]
-
-
-@probe_of("twins.drawn_units")
-def _(settings, patch):
-    counts, n = [], null(settings)
-    patch.setattr(predict, "drawn_banks", lambda *a: counts.append(a[4]) or [dict.fromkeys(n.keys, 0.0)] * a[4])
-    predict.with_drawn_pattern(SimpleNamespace(base=None, conditions=(), shape=SHAPE, seed=0), MODEL, n, n.prediction)
-    return counts
-
-
-@probe_of("twins.to_confirm")
-def _(settings, patch):
-    problem = scripted(repeat(10.0), settings=settings)
-    confirmed(problem, found_at(0.02, 10.0))
-    return problem.counts
-
-
-@probe_of("searching.most_fitted")
-def _(settings, patch):
+def names_of_fitted(settings: DiagnosisSettings) -> list[str]:
     names = ("dead_time", "comparator_delay", "crosstalk", "ir_drop", "photodiode_lag", "incomplete_reset",
              "readout_skew", "optical_blur", "clock_jitter", "lamp_drift", "light_flicker", "blooming")  # fmt: skip
-    return len(shortlist.starts_to_fit([Screened(n, {}, 100.0, NOTHING) for n in names], 1000.0, settings.searching))
+    screened = [Screened(name, {}, 100.0, np.zeros(1)) for name in names]
+    return [s.name for s in shortlist.starts_to_fit(screened, 1000.0, settings.searching)]
 
 
-@probe_of("concluding.most_left")
-def _(settings, patch):
-    """A share of the deviance is left: one statistic is beyond chance by itself, all others a little off."""
-    n, before, decisions = exact(settings, PLACES), np.full(101, 300.0), []
-    whole, one = loss(n, before) - 101, loss(n, np.r_[6.0, np.zeros(100)])
-    for share in beside(0.05):
-        each = (101 + share * whole - one) / 100
-        left = np.r_[6.0, np.full(100, np.sqrt(8.0 * np.expm1(each / 9.0)))]
-        known = replace(n.prediction, mean=before - left, error=np.zeros(101), own=np.zeros(101))
-        decisions.append(explains(n, before, known))
-    return decisions
+def dark_is_off(settings: DiagnosisSettings, factor: float) -> bool:
+    """Whether a dark current of so many times the nominal is no unit's of the model."""
+    case = SimpleNamespace(scenes_only=False, settings=settings)
+    return "dark_current" in off_nominal(case, MODEL, replace(unit(), dark=factor * unit().dark)).parameters
 
 
-@probe_of("concluding.most_left_there")
-def _(settings, patch):
-    n, before = exact(settings, PLACES), np.r_[np.full(100, 1000.0), 60.0]
-    means = [np.r_[np.full(100, 1000.0), 60.0 - 60.0 * np.sqrt(share)] for share in beside(0.25)]
-    return [explains(n, before, replace(n.prediction, mean=mean)) for mean in means]
+def explained(settings: DiagnosisSettings, share: float) -> bool:
+    """Whether a name explains a hundred statistics, and of another place all but a share of the squares."""
+    keys = (*(StatisticKey("rates", "a", str(n)) for n in range(100)), StatisticKey("drift", "b", "0"))
+    null, before = known(settings, keys), np.r_[np.full(100, 1000.0), 60.0]
+    mean = np.r_[np.full(100, 1000.0), 60.0 - 60.0 * np.sqrt(share)]
+    return explains(null, before, replace(null.prediction, mean=mean))
 
 
-@probe_of("bounding.campaigns")
-def _(settings, patch):
-    left_out = []
-    for limit in beside(150):
-        case = SimpleNamespace(settings=settings, budget=Budget(limit), conditions=(None,), scenes_only=False, jobs=1)
-        bounds(case, MODEL, None, None, [], SimpleNamespace(weakest=()))
-        left_out.append(bool(case.budget.left_out))
-    return left_out
+DECISIONS = {
+    "judging.alarm": (0.02, lambda s, p: is_discrepant(known(s), off_by_p(p))),
+    "judging.gate": (0.005, lambda s, p: is_significant(known(s), off_by_p(p))),
+    "judging.chance_p": (0.002, lambda s, p: may_be_chance(SimpleNamespace(smallest_p=p, null=known(s)), [])),
+    "baseline.false_alarm": (1.0, lambda s, _: round(motion.least_deviate(1000, s.baseline), 6)),
+    "unit.usual": (1.8, dark_is_off),
+    "searching.most_fitted": (1.0, lambda s, _: names_of_fitted(s)),
+    "concluding.most_left_there": (0.25, explained),
+}
+"""By setting: its default, or 1, and a decision by the settings on a number a little below and above it."""
 
 
-@probe_of("maps.units")
-def _(settings, patch):
-    """Units over which the last prediction of a fit of maps is taken."""
-    counts = []
-    patch.setattr(maps_search, "unit_means", lambda *a: counts.append(len(a[3])) or np.zeros(COUNT))
-    patch.setattr(maps_search, "with_use", lambda *_: np.ones(COUNT, bool))
-    start = PatternModel(MODEL, {"response": 1.0})
-    maps_search.fit_candidate(SimpleNamespace(settings=settings), start, null(settings), np.full(COUNT, 1000.0), "")
-    return counts[-1]
-
-
-@probe_of("maps.most_effects")
-def _(settings, patch):
-    """Effects that are added to a model of maps, where each of twelve removes 60."""
-
-    def fitted(case, state, null, values, name):
-        added = (*state.added, name) if name else ()
-        return MapFit(name, PatternModel(MODEL, {}, added), {}, NOTHING, NOTHING, 1000.0 - 60.0 * len(added))
-
-    patch.setattr(maps_search, "fit_candidate", fitted)
-    patch.setattr(maps_search, "is_significant", lambda *_: True)
-    case = SimpleNamespace(jobs=1, settings=settings)
-    return len(search_maps(case, PatternModel(MODEL, {}), None, None, [f"effect {n}" for n in range(12)])[0]) - 1
-
-
-@probe_of("maps.most_left")
-def _(settings, patch):
-    """Maps whose mean square distance is 10 000 times that of chance."""
-    for name in ("significant_effects", "spreads_off", "gap_of_maps", "map_statistics"):
-        patch.setattr(maps_conclude, name, lambda *_: ())
-    patch.setattr(maps_conclude, "patched_model", lambda *_: MODEL)
-    n, values, verdicts = null(settings), null().mean + 100.0, []
-    for share in beside(0.08):
-        left = values - 100.0 * np.sqrt(share) * n.noise
-        fit = MapFit("", PatternModel(MODEL, {}), {}, left, np.full(COUNT, 30.0), 0.0)
-        case = SimpleNamespace(settings=settings)
-        verdicts.append(maps_conclude.conclude_maps(case, MODEL, n, values, [[fit]], [], []).verdict)
-    return verdicts
+@pytest.mark.parametrize("times", [0.5, 2.0])
+@pytest.mark.parametrize("name", DECISIONS)
+def test_a_setting_at_half_or_twice_its_value_decides_otherwise(name: str, times: float):
+    middle, decision = DECISIONS[name]
+    [field] = [field for stage, key, field in every_setting() if f"{stage}.{key}" == name]
+    least, most = field.metadata["range"]
+    changed = DiagnosisSettings.of({name: type(field.default)(min(max(times * field.default, least), most))})
+    default, other = ([decision(s, x * middle) for x in (0.75, 1.5)] for s in (DiagnosisSettings(), changed))
+    print(f"{name}: {default}, at {times} times {other}")
+    assert default != other

@@ -88,22 +88,6 @@ def test_threads_and_cameras_of_both_kinds_in_a_call_change_no_bit() -> None:
     assert np.array_equal(np.unpackbits(packed, axis=1, bitorder="little"), alone[0])
 
 
-@pytest.mark.parametrize(("interval", "often"), [(1, True), (2, True), (3, True), (4, False), (6, False)])
-def test_light_that_changes_often_is_served_frame_by_frame(interval: int, often: bool) -> None:
-    """On either side of OFTEN, and never for fewer frames than are served at a time."""
-    shape, frames = (2, 8), 24
-    light = Keyframes(np.arange(frames + 1.0) * interval, np.full((frames + 1, *shape), 0.1, np.float32))
-    sensor = SpikeSensor("ideal", shape)
-
-    def served(count: int) -> bool:
-        room = np.empty((count, 16), np.uint8)
-        (stretch,) = fast.stretches(sensor._pixels.pixels, light, 0, sensor._imaging, room)
-        return stretch.changes_often
-
-    assert served(frames) == often
-    assert not served(every_frame.AT_ONCE - 1)
-
-
 @pytest.mark.parametrize(
     "kernel, name, source",
     [

@@ -10,7 +10,7 @@ import pytest
 from spikecam_env.campaign import read_campaign
 from spikecam_env.campaign.writing import finish_campaign, save_spikes
 from spikecam_env.errors import InputError
-from spikecam_env.gap.baseline.motion import common_mode, expected_variance, find_motion
+from spikecam_env.gap.baseline.motion import find_motion
 from spikecam_env.gap.baseline.null_model import model_null
 from spikecam_env.gap.baseline.static_part import without_motion
 from spikecam_env.gap.compare.distance import adjusted, deviates
@@ -112,23 +112,6 @@ def test_a_ball_that_crosses_and_a_slow_drift_are_found() -> None:
     print(crossing.text, slow.text, sep="\n")
     assert 32 in range(crossing.rows[0], crossing.rows[1] + 1)
     assert slow.share > 0.3
-
-
-def test_a_change_of_all_pixels_by_their_level_is_taken_out() -> None:
-    """A lamp 20 % brighter and a dark level higher by one: the parabola has both, whatever a tenth of pixels does."""
-    mean = np.linspace(2.0, 20.0, 400)
-    counts = 1.2 * mean + 1.0
-    counts[::10] += 8.0
-    expected = common_mode(counts, mean, np.ones(400, bool))
-    assert np.abs(expected - (1.2 * mean + 1.0)).max() < 0.05
-
-
-def test_a_count_varies_as_that_of_an_integrator() -> None:
-    """f (1 - f), of a uniform phase: a tenth of Poisson's at 2.5 spikes; at most a third more by OWN_NOISE."""
-    phases = np.random.default_rng(0).random(100_000)
-    for expected in (2.25, 2.5, 7.75):
-        measured = float(np.var(np.floor(phases + expected)))
-        assert measured < expected_variance(np.array(expected)) < measured + 0.11
 
 
 @pytest.mark.parametrize(

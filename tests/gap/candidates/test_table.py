@@ -4,9 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-import pytest
-
-from spikecam_env.gap.candidates.table import LACKING, Candidate, Candidates, acting_through, candidate
+from spikecam_env.gap.candidates.table import LACKING, Candidate, acting_through, candidate
 from spikecam_env.gap.candidates.table import testable as split_testable
 from spikecam_env.gap.observe.conditions import Condition
 from spikecam_env.sensor import CATALOGUE, Effect, SensorModel, Stage
@@ -15,20 +13,6 @@ from spikecam_env.sensor.effects.base import parameter
 
 def test_a_candidate_knows_its_name():
     assert all(candidate(name).name == name for name in CATALOGUE)
-
-
-@pytest.mark.parametrize(
-    "names, any_pattern, all_pattern, only_contrast",
-    [
-        (("row_fixed_pattern", "hot_pixels"), True, True, False),
-        (("row_fixed_pattern", "dead_time"), True, False, False),
-        (("readout_skew", "optical_blur"), False, False, True),
-        (("readout_skew", "crosstalk"), False, False, False),
-    ],
-)
-def test_several_have_properties_of_any_or_all(names, any_pattern, all_pattern, only_contrast):
-    group = Candidates(names)
-    assert (group.any_pattern, group.all_pattern, group.only_contrast) == (any_pattern, all_pattern, only_contrast)
 
 
 def test_effects_that_bend_the_response_are_of_two_families():

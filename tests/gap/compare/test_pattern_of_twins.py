@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 import small
@@ -14,7 +12,6 @@ from spikecam_env.gap.fit.predict import predict_by_twins
 from spikecam_env.gap.statistics import StatisticKey
 
 KEYS = (StatisticKey("rates", "flat", "slope"), StatisticKey("pattern", "flat", "width"))
-NAN = np.array([np.nan, np.nan])
 WITHOUT = Draw(0, np.array([1.0, 5.0]), None, np.array([np.nan, 7.0]))
 NULL = Null(KEYS, np.array([1.0, 5.5]), np.ones(2), np.zeros(2), 12, 11.0, draws=(WITHOUT,))
 
@@ -24,13 +21,6 @@ def test_a_pattern_is_moved_as_that_of_the_twin_is(moved: float, predicted: bool
     made = Draw(0, np.array([2.0, np.nan]), None, np.array([np.nan, 7.0 + moved]))
     values = with_pattern_moved(NULL, made).values
     assert values[0] == 2.0 and (values[1] == pytest.approx(5.0 + moved) if predicted else np.isnan(values[1]))
-
-
-def test_without_a_pattern_nothing_is_moved():
-    made = Draw(0, np.array([2.0, np.nan]), None, NAN)
-    assert np.isnan(with_pattern_moved(NULL, made).values[1])
-    bare = replace(NULL, draws=(replace(WITHOUT, pattern=None),))
-    assert np.isnan(with_pattern_moved(bare, replace(made, pattern=WITHOUT.pattern)).values[1])
 
 
 def test_a_synchronous_reset_narrows_the_pattern_of_bright_flats():

@@ -64,15 +64,6 @@ def test_a_variance_far_below_its_like_is_chance():
     assert found[0] > 0.4
 
 
-def test_few_variances_make_each_other_no_surer_than_they_are():
-    """Of six recordings of one kind: the error of their mean is part of it."""
-    keys, rng = [StatisticKey("spectrum", f"flat-{r}", "band 0") for r in range(6)], np.random.default_rng(8)
-    found = [moderated(keys, rng.chisquare(FREEDOM, len(keys)) / FREEDOM, FREEDOM) for _ in range(400)]
-    error2 = np.mean([np.log(v) ** 2 for v, _ in found])
-    stated = np.mean([polygamma(1, f / 2) for _, f in found])
-    assert error2 == pytest.approx(stated, rel=0.15)
-
-
 def test_a_variance_that_stands_alone_or_is_zero_stays():
     keys = [*KEYS, StatisticKey("step", "step", "undershoot"), StatisticKey("spectrum", "dark", "band 0")]
     made = np.append(drawn(np.ones(len(KEYS)), 6), [7.0, 0.0])

@@ -6,27 +6,19 @@ from collections.abc import Callable
 from types import SimpleNamespace
 
 import numpy as np
-from small import MODEL, unit
+from small import MODEL, TWINS, made_up_null, unit
 
 from spikecam_env.gap.candidates.strength import with_effect
 from spikecam_env.gap.compare.prediction import Draw, Null, Prediction
-from spikecam_env.gap.fit.gauss_newton import WHITE, Probe, derivative_step, derivatives, descend, prior_sd
+from spikecam_env.gap.fit.gauss_newton import Probe, descend
 from spikecam_env.gap.fit.problem import Problem
-from spikecam_env.gap.statistics import StatisticKey
 from spikecam_env.gap.unit.refit import BaseFit
 from spikecam_env.sensor import SensorModel
 
-COUNT, TWINS = 60, 12
+COUNT = 60
 NAME = "incomplete_reset"
 TRUE = {"fraction": 0.02, "tau_us": 300.0}
 FREE = [(NAME, key) for key in TRUE]
-
-
-def null() -> Null:
-    values = np.random.default_rng(0).standard_normal((TWINS, COUNT))
-    draws = tuple(Draw(n, v, None) for n, v in enumerate(values))
-    keys = tuple(StatisticKey("rates", "r", str(i)) for i in range(COUNT))
-    return Null(keys, values.mean(axis=0), values.std(axis=0, ddof=1), np.zeros(COUNT), TWINS, TWINS - 1, draws=draws)
 
 
 def problem_of(n: Null, measured: np.ndarray) -> Problem:
@@ -58,7 +50,7 @@ def parameters_of(model: SensorModel) -> dict[str, float]:
 
 
 def test_both_parameters_are_found_within_their_errors():
-    n = null()
+    n = made_up_null(COUNT)
     measured = n.mean + law(**TRUE) + n.sd * np.random.default_rng(1).standard_normal(COUNT)
     end = descend(problem_of(n, measured), probe_of(n, law), start(fraction=0.6, tau_us=2.0), unit(), FREE)
     found = parameters_of(end.model)
@@ -69,31 +61,9 @@ def test_both_parameters_are_found_within_their_errors():
         assert abs(np.log(found[key] / TRUE[key])) < 4 * error
 
 
-def test_what_one_parameter_moves_says_how_far_another_of_its_effect_does():
-    """Statistics that the time constant moves by less than is clear have its derivative too, and a doubt about it."""
-    n = null()
-
-    def weak(fraction: float, tau_us: float) -> np.ndarray:
-        return law(fraction, TRUE["tau_us"]) * (1.0 + 0.02 * np.log(tau_us / TRUE["tau_us"]) * (np.arange(COUNT) < 30))
-
-    model, probe = start(fraction=1.0, tau_us=1.0), probe_of(n, weak)
-    columns, noise = derivatives(problem_of(n, n.mean), probe, model, unit(), probe(model, unit()), FREE)
-    told = columns[:30, 1]
-    print(told[:3], noise[:3])
-    assert np.all(columns[:, 0] != 0) and 0.1 < np.median(told) < 0.6 and np.all(columns[30:, 1] == 0)
-    assert np.all(np.abs(noise[:, 1]) > 0)
-
-
-def test_shapes_are_told_by_steps_that_suit_them():
-    """A time constant by half a logarithm, the level from which light spills by a tenth; each is open by twice that."""
-    free = [("blooming", "share"), ("blooming", "full"), ("incomplete_reset", "tau_us"), WHITE]
-    assert [derivative_step(*parameter, peak=12.0) for parameter in free] == [0.5, -0.1, -0.5, -0.2]
-    assert list(prior_sd(free)) == [1.0, 0.2, 1.0, 1.0]
-
-
 def test_where_steps_come_to_leave_more_the_best_is_kept():
     """A law that promises more of the fraction, and turns round where the step leads."""
-    n = null()
+    n = made_up_null(COUNT)
     here = 0.5 * TRUE["fraction"]
 
     def broken(fraction: float, tau_us: float) -> np.ndarray:
@@ -106,51 +76,3 @@ def test_where_steps_come_to_leave_more_the_best_is_kept():
     print(parameters_of(end.model), parameters_of(kept.model))
     assert parameters_of(end.model) == parameters_of(first)
     assert abs(np.log(parameters_of(kept.model)["fraction"] / TRUE["fraction"])) < 0.05
-
-
-def test_a_far_step_that_promises_little_is_not_taken():
-    """Nothing tells the time constant but a whisper, that would have it three times as long."""
-    n = null()
-
-    def whisper(fraction: float, tau_us: float) -> np.ndarray:
-        return law(fraction, TRUE["tau_us"]) + 0.4 * np.log(tau_us / TRUE["tau_us"]) * (np.arange(COUNT) < 30)
-
-    measured = n.mean + law(**TRUE) + np.where(np.arange(COUNT) < 30, 0.45, 0.0)
-    end = descend(
-        problem_of(n, measured), probe_of(n, whisper), start(fraction=1.0, tau_us=1.0), unit(), FREE, to_step=20.0
-    )
-    print(parameters_of(end.model), np.sqrt(np.diag(end.covariance)))
-    assert parameters_of(end.model) == TRUE
-
-
-def test_steps_go_on_while_they_are_worth_their_twins():
-    """One look here and one for each derivative; then a step that promises too little is the last."""
-    n = null()
-    measured = n.mean + law(**TRUE)
-
-    def looks(to_step: float) -> int:
-        seen = []
-
-        def probe(model: SensorModel, base: BaseFit) -> Prediction:
-            seen.append(parameters_of(model))
-            return probe_of(n, law)(model, base)
-
-        descend(problem_of(n, measured), probe, start(fraction=0.6, tau_us=2.0), unit(), FREE, to_step=to_step)
-        return len(seen)
-
-    assert looks(1e6) == 1 + len(FREE) < looks(1.0)
-
-
-def test_a_step_that_removed_nothing_is_the_last_but_one():
-    """A camera whose derivatives promise a change that no step makes."""
-    n = null()
-    measured, here, looks = n.mean + law(**TRUE), parameters_of(start(fraction=0.5, tau_us=1.0)), []
-
-    def probe(model: SensorModel, base: BaseFit) -> Prediction:
-        nudged = (None, "fraction", "tau_us")[len(looks) % 3]
-        looks.append(nudged)
-        there = {key: value * (1.3 if key == nudged else 1.0) for key, value in here.items()}
-        return probe_of(n, law)(with_effect(MODEL, NAME, there), base)
-
-    descend(problem_of(n, measured), probe, start(fraction=0.5, tau_us=1.0), unit(), FREE)
-    assert len(looks) == 2 * (1 + len(FREE))

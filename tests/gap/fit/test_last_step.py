@@ -7,7 +7,6 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from scripted import COUNT, NAME, law, with_reset
 from small import MODEL, unit
 
 from spikecam_env.gap.candidates.strength import with_effect
@@ -21,14 +20,22 @@ from spikecam_env.gap.search.round import Round
 from spikecam_env.gap.statistics import StatisticKey
 from spikecam_env.gap.twins.budget import Budget
 
+NAME = "incomplete_reset"
 TRUE = {"fraction": 0.02, "tau_us": 300.0}
-TWINS = 24
+COUNT, TWINS = 20, 24
 CAMPAIGNS = 200
 AT_LEAST = 0.9 - 3 * np.sqrt(0.9 * 0.1 / CAMPAIGNS)
 """Share of 90 % intervals that contain the truth, three deviations of a binomial below."""
 
 STOPPED_AT = [(1.0, 1.0), (1.3, 1.0), (0.75, 1.4), (1.35, 0.6)]
 """Fraction and time constant, over the true ones, at which a fit stops: strengths are right to a third."""
+
+
+def law(model) -> np.ndarray:
+    """Half of the statistics in proportion to the fraction, as many to its product with a root of the time constant."""
+    [effect] = [e.parameters() for e in model.effects if e.name == NAME]
+    power = np.where(np.arange(COUNT) < COUNT // 2, 0.0, 0.5)
+    return 20.0 * effect["fraction"] / TRUE["fraction"] * (effect["tau_us"] / TRUE["tau_us"]) ** power
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,7 +66,7 @@ def campaign(seed: int, limit: float, true: float = TRUE["fraction"]) -> ByLaw:
     keys = tuple(StatisticKey("rates", "r", str(i)) for i in range(COUNT))
     draws = tuple(Draw(n, v, None) for n, v in enumerate(values))
     null = Null(keys, values.mean(axis=0), np.ones(COUNT), np.full(COUNT, 1e-9), TWINS, TWINS - 1, draws=draws)
-    measured = law(with_reset(true)) + rng.standard_normal(COUNT)
+    measured = law(with_effect(MODEL, NAME, TRUE | {"fraction": true})) + rng.standard_normal(COUNT)
     case = SimpleNamespace(jobs=1, base=unit(), conditions=(), budget=Budget(limit))
     return ByLaw(case, MODEL, null, measured, measured)
 

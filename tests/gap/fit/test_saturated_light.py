@@ -10,10 +10,9 @@ from functools import lru_cache
 
 import numpy as np
 import pytest
-from small import MODEL, effect, recorded
+from small import MODEL, effect, problem_of, recorded
 
 from spikecam_env.gap.baseline.null_model import model_null
-from spikecam_env.gap.compare.prediction import values_of
 from spikecam_env.gap.fit.candidate import Fit, fit
 from spikecam_env.gap.fit.gauss_newton import derivatives, moved
 from spikecam_env.gap.fit.predict import predict_by_twins
@@ -28,8 +27,7 @@ def fitted() -> tuple[Problem, Fit]:
     """Crosstalk fitted, from four fifths of it."""
     case = recorded(effect("crosstalk", kick=TRUE, when="frame_end"), seed=4)
     without = model_null(case, MODEL, 12)
-    measured = values_of(case.bank, without.keys)
-    problem = Problem(case, MODEL, without, measured, measured)
+    problem = problem_of(case, without)
     return problem, fit(problem, "crosstalk", {"kick": 0.8 * TRUE, "when": "frame_end"})
 
 

@@ -124,16 +124,6 @@ def test_an_effect_whose_law_has_changed_is_simulated_anew(kept_in: Path, tmp_pa
     assert made_up == ["dead_time", "grey_filter", "grey_filter"]
 
 
-def test_others_templates_are_taken_in_this_noise_and_what_they_lack_as_no_change() -> None:
-    shipped = shipped_templates()
-    entry = Template("dead_time", {"tau_us": 0.3}, np.full(shipped.noise.size - 1, 4.0))
-    made = Templates(shipped.keys[1:], 2 * shipped.noise[1:], {}, {}, (entry,), {"dead_time": "law"})
-    found = shipped.with_those_of([made])
-    [shift] = shift_of(found, "dead_time")
-    assert shift[0] == 0 and np.allclose(shift[1:], 8.0) and found.laws["dead_time"] == "law"
-    assert len(found.entries) == len(shipped.entries) - len(shift_of(shipped, "dead_time")) + 1
-
-
 def test_the_cache_is_where_the_system_has_it(monkeypatch, tmp_path: Path) -> None:
     monkeypatch.delenv(cache_folder.VARIABLE, raising=False)
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from itertools import pairwise
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -15,7 +14,6 @@ from spikecam_env.gap.observe.observation import (
     FRAME_LAGS,
     LENGTHS,
     TIME_BLOCKS,
-    ObservedRecording,
     observe,
 )
 from spikecam_env.streams import pack_frames
@@ -219,10 +217,3 @@ def test_an_empty_and_a_full_stream():
     assert empty.frame.sum() == 0 and np.all(empty.times.first == -1) and np.isnan(empty.variance).all()
     assert full.times.count.min() == 70 and full.lengths[0] == 69 * 20 and full.lengths[1:].sum() == 0
     assert np.all(full.variance == 0) and np.all(full.late == 0) and full.odd.sum() == 0
-
-
-@pytest.mark.parametrize("share, few", [(0.2, True), (0.45, False)])
-def test_pixels_with_irregular_intervals_count_as_few_up_to_three_tenths(share, few):
-    short = (np.arange(1000) < 1000 * share).astype(np.int64)
-    found = ObservedRecording.irregular.fget(SimpleNamespace(short=short, long=np.zeros(1000, np.int64)))
-    assert found.sum() == (1000 * share if few else 0)

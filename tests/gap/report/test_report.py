@@ -19,7 +19,6 @@ from spikecam_env.code_version import code_version
 from spikecam_env.gap.report import plots
 from spikecam_env.gap.report.exhibits import Exhibit, by_z, exhibits
 from spikecam_env.gap.report.exhibits.spectrum import averaged, panels
-from spikecam_env.gap.report.exhibits.step import free_window
 from spikecam_env.gap.report.page import report, write_report
 from spikecam_env.gap.report.panels import PlotPanel
 from spikecam_env.gap.report.plots import strip
@@ -204,12 +203,6 @@ def test_recordings_without_spikes_or_labels_leave_out_what_they_cannot_show() -
     print([(x.name, [p.title for p in x.panels]) for x in left])
     assert {x.name for x in left} == {"rates", "pattern"}
     Page(report(replace(d, evidence=e)))
-
-
-def test_a_window_around_an_edge_holds_no_other() -> None:
-    assert free_window([499, 999], 1500) == (64, 320)
-    assert free_window([100, 300, 500], 1500) == (64, 192)
-    assert free_window([499], 1500) == (64, 320)
 
 
 def test_the_spectrum_of_independent_spikes_is_flat_at_one() -> None:

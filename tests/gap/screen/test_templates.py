@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-from dataclasses import replace
 from importlib import resources
 
 import numpy as np
@@ -13,12 +12,11 @@ from small import MODEL, effect, recorded
 from spikecam_env.gap.baseline.null_model import model_null
 from spikecam_env.gap.candidates.table import NOISE_OF_A_RESET
 from spikecam_env.gap.compare.distance import loss
-from spikecam_env.gap.compare.prediction import Null, values_of
+from spikecam_env.gap.compare.prediction import values_of
 from spikecam_env.gap.fit.standard_templates import is_lacking
-from spikecam_env.gap.screen.screen import Screened, screen
+from spikecam_env.gap.screen.screen import screen
 from spikecam_env.gap.screen.templates import FILE, SEVERE, save_templates, shipped_templates
-from spikecam_env.gap.search.neighbours import other_starts
-from spikecam_env.gap.search.shortlist import groups_that_stand_out, starts_to_fit
+from spikecam_env.gap.search.shortlist import starts_to_fit
 from spikecam_env.gap.settings import Searching
 from spikecam_env.gap.statistics import StatisticKey
 from spikecam_env.sensor import CATALOGUE
@@ -50,41 +48,6 @@ def test_saved_templates_are_read_again(tmp_path):
     with resources.as_file(shipped) as path, np.load(path) as first, np.load(tmp_path / FILE) as again:
         assert json.loads(str(first["about"])) == json.loads(str(again["about"]))
         assert all(np.array_equal(first[key], again[key]) for key in ("shift", "noise"))
-
-
-def test_the_best_are_tried_and_what_takes_many_twins_where_it_explains_half():
-    """Of 1000, misfits by template: the three best, others of less than half of the best's 100 left, at most five."""
-    left = {"clock_jitter": 100.0, "lamp_drift": 560.0, "crosstalk": 700.0, "ir_drop": 800.0, "dead_time": 900.0}
-    names = lambda found: [s.name for s in starts_to_fit(found, 1000.0, Searching())]  # noqa: E731
-    screened = [Screened(name, {}, misfit, np.zeros(1)) for name, misfit in left.items()]
-    assert names(screened) == ["clock_jitter", "crosstalk", "ir_drop"]
-    nearer = [replace(s, misfit=540.0) if s.name in ("lamp_drift", "dead_time") else s for s in screened]
-    nearer.sort(key=lambda s: s.misfit)
-    assert names(nearer) == ["clock_jitter", "lamp_drift", "dead_time"]
-    assert names(screened[1:2]) == ["lamp_drift"] and starts_to_fit([], 1000.0, Searching()) == []
-
-
-def test_where_motion_stands_out_all_that_shows_by_it_is_tried_in_every_shape():
-    """A template of other bars may take the level from which light spills for another."""
-    shapes = [Screened("blooming", {"full": full}, 1000.0, np.zeros(1)) for full in (0.85, 1.0, 0.75)]
-    screened = [Screened("clock_jitter", {}, 100.0, np.zeros(1)), *shapes]
-    tried = starts_to_fit(screened, 1000.0, Searching(), {"moving"})
-    assert [s.start for s in tried if s.name == "blooming"] == [s.start for s in shapes]
-    assert other_starts(shapes[1], screened, 1000.0, 0.5) == [shapes[0], shapes[2]]
-    assert [s.start for s in starts_to_fit(screened, 1000.0, Searching()) if s.name == "blooming"] == [{"full": 0.85}]
-
-
-def test_the_loudest_group_stands_out_however_quiet_it_is():
-    """An alarm raised by motion alone, at 5.5 noises, was never put to blooming."""
-    keys = (
-        StatisticKey("rates", "flat", "slope"),
-        StatisticKey("moving", "bars", "bloom"),
-        StatisticKey("step", "step", "down 1-2"),
-    )
-    null = Null(keys, np.zeros(3), np.ones(3), np.ones(3), 12, 11.0)
-    assert groups_that_stand_out(null, np.array([5.0, -5.5, 1.0])) == {"moving"}
-    assert groups_that_stand_out(null, np.array([5.0, -5.5, 7.0])) == {"step"}
-    assert groups_that_stand_out(null, np.array([50.0, -6.5, 7.0])) == {"rates", "moving", "step"}
 
 
 @pytest.mark.slow

@@ -12,13 +12,11 @@ from small import MODEL, effect
 from spikecam_env.gap.baseline.null_model import model_null
 from spikecam_env.gap.compare.prediction import values_of
 from spikecam_env.gap.diagnose import templates_for
-from spikecam_env.gap.fit.candidate import Fit
 from spikecam_env.gap.fit.problem import Problem
 from spikecam_env.gap.observe.conditions import Condition
 from spikecam_env.gap.observe.observation import observe
 from spikecam_env.gap.search import joint_start
-from spikecam_env.gap.search.joint_start import Pair, fit_pairs, one_by_one, pairs, with_pairs
-from spikecam_env.gap.search.round import Round
+from spikecam_env.gap.search.joint_start import Pair, fit_pairs, pairs
 from spikecam_env.gap.twins.case import case_of
 from spikecam_env.sensor import SpikeSensor
 from spikecam_env.streams import pack_frames
@@ -27,34 +25,6 @@ PAIR = Pair("clock_feedthrough", "readout_skew")
 EDGE = {"amplitude_mV": -12.0, "phase_frames": 0.62, "tau_us": 10.0}
 SPAN = -0.45
 SHAPE, FRAMES = (64, 160), 400
-
-
-def a_fit(name: str, misfit: float, *more: str) -> Fit:
-    model = MODEL
-    for each in (*more, name):
-        model = model.with_effect(effect(each))
-    return Fit(name, {}, {}, SimpleNamespace(), SimpleNamespace(), np.zeros(1), misfit, model)  # type: ignore[arg-type]
-
-
-def test_a_pair_that_leaves_less_stands_in_place_of_its_first_effect():
-    alone, pair, other = a_fit("clock_feedthrough", 50.0), a_fit("clock_feedthrough", 40.0, "readout_skew"), a_fit(
-        "supply_ripple", 45.0
-    )  # fmt: skip
-    assert with_pairs([alone, other], [pair], 6.0) == [pair, other]
-    assert with_pairs([alone, other], [replace(pair, misfit=45.0)], 6.0) == [alone, other]
-    assert with_pairs([other], [pair], 6.0) == [pair, other]
-
-
-def test_a_pair_is_two_rounds_each_with_a_model_of_its_own():
-    pair = a_fit("clock_feedthrough", 40.0, "readout_skew")
-    turn = Round(MODEL, pair.base, pair.prediction, np.zeros(1), 100.0, (pair,))
-    first, second = one_by_one(turn)
-    assert first is turn and second.fits[0].name == "readout_skew"
-    assert second.fits[0].parameters == effect("readout_skew").parameters()
-    assert {e.name for e in second.model.effects} - {e.name for e in MODEL.effects} == {"clock_feedthrough"}
-    assert second.fits[0].model is pair.model
-    alone = replace(turn, fits=(a_fit("clock_feedthrough", 40.0),))
-    assert one_by_one(alone) == [alone]
 
 
 @pytest.fixture(scope="module")

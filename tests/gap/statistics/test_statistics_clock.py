@@ -55,11 +55,6 @@ def test_a_pixel_within_a_25th_of_a_frame_is_beside_it(off, part):
         assert found[f"A_1 {part} 0"] == pytest.approx(1e3 * 0.2 / 2, rel=1e-3)
 
 
-@pytest.mark.parametrize("terms, stated", [(3_500, False), (7_000, True)])
-def test_a_mean_is_of_5_000_second_differences(terms, stated):
-    assert ("A_1 between" in clock(np.array([7.5]), np.zeros(1), terms)) == stated
-
-
 @pytest.mark.parametrize("frames, count", [(800, 1), (1700, 1), (3400, 3), (100_000, 10)])
 def test_bands_are_of_1_2_million_pixel_frames_and_ten_at_most(frames, count):
     found = bands((30, 40), frames)

@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-from types import SimpleNamespace
-
 import numpy as np
 import pytest
-from small import CLEAR, check_reveals, effect, recorded, seen
+from small import CLEAR, effect, recorded, seen
 
 from spikecam_env.gap.observe.observation import observe
 from spikecam_env.gap.statistics import StatisticKey
@@ -14,18 +12,6 @@ from spikecam_env.gap.statistics.drift import CONSTANCY, PARTS, lateness
 from spikecam_env.streams import pack_frames
 
 SHAPE, FRAMES = (16, 16), 8000
-
-CASES = [
-    (effect("lamp_drift", sigma_per_root_s=0.02), "flat-0.65", ["trend", "bend"], ["dark", "intervals", "rows"]),
-    (effect("dark_current_drift", rise=0.3, tau_ms=50.0), "dark", ["trend"], ["intervals", "step"]),
-    (effect("random_telegraph_noise", amplitude_pA=1.0, fraction=0.1, dwell_ms=20.0), "flat-0.2", ["pixel tail"], []),
-    (effect("threshold_flicker_noise", sigma_mV=2.0), "flat-0.4", ["pixels"], ["dark"]),
-]
-
-
-@pytest.mark.parametrize("shown_by, where, names, silent", CASES, ids=lambda v: getattr(v, "name", None))
-def test_drift_reveal(shown_by, where, names, silent):
-    check_reveals("drift", shown_by, where, names, silent)
 
 
 def at(times):
@@ -55,10 +41,6 @@ def test_in_the_dark_a_wave_hardly_passes_for_a_drift():
     assert slow["late 0"] < -2 * CONSTANCY < 2 * CONSTANCY < slow["late 7"]
 
 
-def test_few_intervals_tell_nothing():
-    assert lateness(at(np.array([10.0, 3000.0]))) == {}
-
-
 def test_a_change_of_all_pixels_is_no_variance_within_a_pixel():
     drifting = seen(recorded(effect("lamp_drift", sigma_per_root_s=0.3)))
     for flat in ("flat-0.2", "flat-0.65"):
@@ -66,31 +48,3 @@ def test_a_change_of_all_pixels_is_no_variance_within_a_pixel():
         print(f"{flat}: trend {trend:.0f}, pixels {pixels:.1f}")
         assert abs(trend) > 2 * CLEAR
         assert abs(pixels) < CLEAR
-
-
-def dark(late: np.ndarray, timed: int) -> SimpleNamespace:
-    """A dark recording of 6400 frames, mean interval 1, with `timed` intervals in each of its 64 pieces, in each of
-    which they are longer by `late` (64,) on average."""
-    frames = np.zeros(6400)
-    frames[::100] = 1.0
-    return SimpleNamespace(
-        frames=6400,
-        shape=(1, 1),
-        frame=np.ones(6400, np.int32),
-        late=np.repeat(late * timed, 100) * frames,
-        timed=(timed * frames).astype(np.int32),
-    )
-
-
-@pytest.mark.parametrize("timed, stated", [(8, False), (19, True)])
-def test_a_part_of_a_hundred_intervals_has_a_mean(timed, stated):
-    """Eight pieces make a part."""
-    assert len(lateness(dark(np.zeros(64), timed))) == (PARTS if stated else 0)
-
-
-@pytest.mark.parametrize("error", [0.5e-4, 2e-4, 8e-4])
-def test_lateness_is_in_units_of_its_standard_error_where_that_is_above_two_in_ten_thousand(error):
-    """Pieces scatter by +- s about their part, whose mean then has the standard error s / sqrt(8)."""
-    pieces = 1e-3 + error * np.sqrt(8) * np.tile([1.0, -1.0], 32)
-    found = lateness(dark(pieces, 20))["late 3"]
-    assert found == pytest.approx(1e-3 / np.sqrt(1.0 + (error / 2e-4) ** 2), rel=1e-6)

@@ -2,19 +2,7 @@
 
 from __future__ import annotations
 
-import pytest
-from small import CLEAR, check_reveals, effect, quiet, recorded, seen
-
-CASES = [
-    (effect("missed_spikes", probability=0.002), "flat-0.2", ["long"], ["timing"]),
-    (effect("spurious_spikes", probability=0.0005), "flat-0.2", ["short", "length 1", "length 2"], ["timing"]),
-    (effect("afterpulsing", probability=0.002), "flat-0.2", ["short", "length 2"], ["timing", "dark"]),
-]
-
-
-@pytest.mark.parametrize("shown_by, where, names, silent", CASES, ids=lambda v: getattr(v, "name", None))
-def test_intervals_reveal(shown_by, where, names, silent):
-    check_reveals("intervals", shown_by, where, names, silent)
+from small import CLEAR, effect, quiet, recorded, seen
 
 
 def test_afterpulsing_shows_at_its_own_delay_only():

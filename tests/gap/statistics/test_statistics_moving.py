@@ -3,23 +3,10 @@
 from __future__ import annotations
 
 import numpy as np
-import pytest
-from small import FRAMES, SHAPE, check_reveals, conditions, effect
+from small import FRAMES, SHAPE, conditions
 
 from spikecam_env.gap.observe.observation import BIN
 from spikecam_env.gap.statistics.film import FEATURES, film_features, light_film
-
-CASES = [
-    (effect("photodiode_lag", fraction=0.06, tau_us=1000.0), "bars", ["lag 16"], ["rates", "noise"]),
-    (effect("readout_skew", span=1.0), "bars", ["skew", "delay"], ["rates", "noise"]),
-    (effect("optical_blur", sigma_pixels=0.5), "bars", ["level", "left"], ["rates", "noise", "step", "neighbours"]),
-    (effect("blooming", share=0.2), "bars", ["bloom"], ["rates", "noise", "step", "neighbours"]),
-]
-
-
-@pytest.mark.parametrize("shown_by, where, names, silent", CASES, ids=lambda v: getattr(v, "name", None))
-def test_moving_reveal(shown_by, where, names, silent):
-    check_reveals("moving", shown_by, where, names, silent)
 
 
 def test_features_are_orthonormal_and_span_the_film():

@@ -5,23 +5,10 @@ from __future__ import annotations
 from dataclasses import replace
 
 import pytest
-from small import CLEAR, SHAPE, case_from, check_reveals, conditions, effect, seen, spikes_of
+from small import CLEAR, SHAPE, case_from, conditions, effect, seen, spikes_of
 
 from spikecam_env.gap.statistics import StatisticKey
 from spikecam_env.sensor import Keyframes
-
-CASES = [
-    (effect("dead_time", tau_us=0.5), "flat-0.65", ["level", "scatter"], ["intervals"]),
-    (effect("comparator_delay", delay_us=0.3), "flat-0.65", ["level"], ["intervals", "spectrum"]),
-    (effect("photo_response_nonlinearity", beta=0.02), "flat-0.65", ["level"], ["intervals"]),
-    (effect("incomplete_reset", fraction=0.05), "flat-0.65", ["level"], ["intervals", "rows"]),
-    (effect("ir_drop", droop=0.005), "flat-0.65", ["level"], ["intervals", "spectrum"]),
-]
-
-
-@pytest.mark.parametrize("shown_by, where, names, silent", CASES, ids=lambda v: getattr(v, "name", None))
-def test_rates_reveal(shown_by, where, names, silent):
-    check_reveals("rates", shown_by, where, names, silent)
 
 
 def test_a_label_that_is_wrong_shows_in_the_level_of_its_recording_most():

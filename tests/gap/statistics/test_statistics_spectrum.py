@@ -4,21 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from small import FRAMES, check_reveals, effect
+from small import FRAMES
 
 from spikecam_env.gap.statistics.spectrum import BANDS, bands, spectrum, strongest_line
-
-CASES = [
-    (effect("light_flicker", modulation=0.02, frequency_hz=400.0), "flat-0.65", ["line", "band 2"], ["dark", "rates"]),
-    (effect("supply_ripple", ripple=0.002, frequency_hz=400.0), "flat-0.65", ["line", "band 2"], ["rates"]),
-    (effect("common_threshold_noise", sigma_mV=3.0), "dark", ["band 7"], ["rates", "intervals"]),
-    (effect("clock_jitter", sigma_ns=500.0), "flat-0.65", ["band 7"], ["step"]),
-]
-
-
-@pytest.mark.parametrize("shown_by, where, names, silent", CASES, ids=lambda v: getattr(v, "name", None))
-def test_spectrum_reveal(shown_by, where, names, silent):
-    check_reveals("spectrum", shown_by, where, names, silent)
 
 
 @pytest.mark.parametrize("cycles", [5, 20, 200])

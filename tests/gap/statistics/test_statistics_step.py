@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 from scipy import stats
-from small import FRAMES, check_reveals, conditions, effect, null, recorded
+from small import FRAMES, conditions, effect, null, recorded
 
 from spikecam_env.gap.observe.conditions import Condition
 from spikecam_env.gap.observe.observation import observe
@@ -16,21 +16,6 @@ from spikecam_env.gap.statistics import StatisticKey
 from spikecam_env.gap.statistics.step import edges_of, statistics, uniform_light
 from spikecam_env.sensor import Keyframes, SpikeSensor
 from spikecam_env.streams import pack_frames
-
-CASES = [
-    (
-        effect("photodiode_lag", fraction=0.06, tau_us=1000.0),
-        "step",
-        ["up 16-32", "down 16-32"],
-        ["rates", "noise", "drift", "spectrum"],
-    ),
-    (effect("readout_skew", span=1.0), "step", ["row up", "row down"], ["rates", "noise", "drift", "spectrum"]),
-]
-
-
-@pytest.mark.parametrize("shown_by, where, names, silent", CASES, ids=lambda v: getattr(v, "name", None))
-def test_step_reveal(shown_by, where, names, silent):
-    check_reveals("step", shown_by, where, names, silent)
 
 
 def test_lag_takes_light_after_an_edge_up_and_gives_it_back_after_one_down():

@@ -5,23 +5,12 @@ from __future__ import annotations
 from types import SimpleNamespace
 
 import numpy as np
-import pytest
-from small import SHAPE, check_reveals, effect, null
+from small import SHAPE, null
 
 from spikecam_env.gap.observe.conditions import Condition
 from spikecam_env.gap.observe.observation import observe
 from spikecam_env.gap.statistics.timing import statistics
 from spikecam_env.streams import pack_frames
-
-CASES = [
-    (effect("common_threshold_noise", sigma_mV=3.0), "flat-0.03", ["late"], []),
-    (effect("clock_jitter", sigma_ns=2000.0), "flat-0.65", ["late", "next"], []),
-]
-
-
-@pytest.mark.parametrize("shown_by, where, names, silent", CASES, ids=lambda v: getattr(v, "name", None))
-def test_timing_reveal(shown_by, where, names, silent):
-    check_reveals("timing", shown_by, where, names, silent)
 
 
 def test_a_few_slow_pixels_of_uneven_intervals_are_no_later_together_than_alone():
@@ -45,14 +34,3 @@ def test_pixels_on_their_own_are_no_later_together_than_alone():
     late = {k.recording: m for k, m in zip(null().keys, null().mean, strict=True) if k.name == "late"}
     print({k: round(float(m), 3) for k, m in late.items()})
     assert len(late) >= 6 and np.abs(list(late.values())).max() < 0.05
-
-
-@pytest.mark.parametrize("frame, counts", [(120, False), (190, True)])
-def test_lateness_counts_after_one_and_a_half_mean_intervals(frame, counts):
-    """Of 1000 pixels, ten of which fire in each frame, all late in one of them."""
-    late = np.zeros(2000)
-    late[frame] = 100.0
-    o = SimpleNamespace(shape=(10, 100), frames=2000, frame=np.full(2000, 10), timed=np.full(2000, 10), late=late,
-                        scatter=np.full(2000, 10.0))  # fmt: skip
-    found = statistics(SimpleNamespace(conditions=[SimpleNamespace(kind="flat")], observations=[o]), 0)
-    assert (found["late"] > -20.0) == counts

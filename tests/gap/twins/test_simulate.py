@@ -8,11 +8,10 @@ import numpy as np
 import pytest
 from small import MODEL, SHAPE, unit
 
-from spikecam_env.gap.observe.conditions import LABEL_ERROR, Condition
-from spikecam_env.gap.twins import simulate as twin
+from spikecam_env.gap.observe.conditions import LABEL_ERROR
 from spikecam_env.gap.twins.simulate import FIRST_SEED, with_label_error, with_random_phases
 from spikecam_env.gap.unit.conversion import unit_from_refit
-from spikecam_env.sensor import Keyframes, SensorModel
+from spikecam_env.sensor import SensorModel
 from spikecam_env.sensor.effects import CATALOGUE
 from spikecam_env.sensor.effects.base import build
 from spikecam_env.sensor.light import GRAINS
@@ -62,25 +61,3 @@ def test_alike_pixels_are_known_no_better_than_labels_say_and_the_sensor_counts(
     spread = replace(alike, gain=np.linspace(0.7, 0.9, alike.gain.size))
     assert with_label_error(spread, 17, 0) is spread
     assert not with_label_error(replace(alike, dark=np.zeros(alike.gain.size)), 17, 0).dark.any()
-
-
-@pytest.mark.parametrize("known", [0.0, LABEL_ERROR])
-def test_the_beat_of_alike_pixels_is_no_surer_than_labels(known: float, monkeypatch):
-    """64 intervals of 30.1222 frames: a light brighter by the error of labels moves the mean square of their second
-    differences by hundreds of the scatter of twins in one light; drawn, it is within their scatter."""
-    monkeypatch.setattr(twin, "LABEL_ERROR", known)
-    light = Keyframes(np.zeros(1), np.full((1, *SHAPE), 0.029, np.float32))
-    flat, model = Condition("flat", "flat", 0.029, light, 8000, "fit"), SensorModel.preset("ideal")
-    every = np.ones(SHAPE[0] * SHAPE[1])
-    dark = 3.4e-4 * every
-
-    def squares(brighter: float) -> np.ndarray:
-        gain = (1.0 / 30.1222 - dark) / float(light.radiance[0, 0, 0]) * (1.0 + brighter)
-        alike = replace(unit(model), gain=gain, dark=dark)
-        seen = [twin.simulate(model, alike, [flat], SHAPE, FIRST_SEED + n, [2])[0].times for n in range(8)]
-        return np.array([t.square[:, 3].sum() / t.terms[:, 3].sum() for t in seen])
-
-    here, there = squares(0.0), squares(LABEL_ERROR)
-    moved, scatter = abs(there.mean() - here.mean()), here.std(ddof=1)
-    print(f"{here.mean():.4f}, in light {LABEL_ERROR:g} brighter {there.mean():.4f}; twins scatter by {scatter:.4f}")
-    assert (moved > 100 * scatter) if known == 0.0 else (moved < 2 * scatter)

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from small import MODEL, unit
 
-from spikecam_env.gap.unit.indirect_inference import extrapolated_unit, gain_change, has_converged, inferred_unit
+from spikecam_env.gap.unit.indirect_inference import inferred_unit
 
 
 def test_a_unit_is_inferred_along_a_line_and_not_to_the_noise_of_each_pixel():
@@ -28,34 +28,6 @@ def test_a_unit_stays_where_an_effect_silences_its_twins():
     base = unit()
     silent = replace(base, gain=np.zeros_like(base.gain))
     assert inferred_unit(MODEL, base, base, [silent]) is base
-
-
-@pytest.mark.parametrize("factor", [0.5, 3.0, 1e3, 1e6])
-def test_a_unit_is_extrapolated_in_proportion_and_four_times_as_far_at_most(factor):
-    base = unit()
-    there = replace(base, gain=1.01 * base.gain, dark=0.9 * base.dark, white=3.0 * base.white)
-    found = extrapolated_unit(base, there, factor, 4.0)
-    reach = min(factor, 4.0)
-    assert np.allclose(found.gain, base.gain * 1.01**reach) and found.white == pytest.approx(base.white * 3.0**reach)
-    assert np.allclose(found.dark, np.maximum(base.dark * (1 - 0.1 * reach), 0.0))
-
-
-@pytest.mark.parametrize("factor", [-0.5, 0.3])
-def test_a_pixel_without_gain_keeps_its_own(factor):
-    """A refit of a dead pixel may have any gain about none."""
-    base = unit()
-    gain = 1.01 * base.gain
-    gain[:2] = -1e-4 * base.gain[0], 0.0
-    found = extrapolated_unit(base, replace(base, gain=gain), factor, 4.0)
-    assert np.array_equal(found.gain[:2], base.gain[:2]) and np.isfinite(found.gain).all()
-
-
-@pytest.mark.parametrize("change, converged", [(2e-4, True), (-2e-4, True), (4.5e-4, False), (-4.5e-4, False)])
-def test_a_unit_has_converged_where_its_gain_changes_by_less_than_3e_4(change, converged):
-    base = unit()
-    there = replace(base, gain=(1 + change) * base.gain)
-    assert has_converged(base, there) == converged
-    assert gain_change(base, there) == pytest.approx(abs(change), rel=1e-3)
 
 
 @pytest.mark.parametrize("share, stays", [(0.35, True), (0.7, False)])

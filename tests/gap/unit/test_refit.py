@@ -2,15 +2,12 @@
 
 from __future__ import annotations
 
-from types import SimpleNamespace
-
 import numpy as np
 import pytest
 from made_up_refit import IDEAL, PIXELS, made_up_refit, model_with
 from small import MODEL, effect, recorded, unit
 
-from spikecam_env.gap.observe.observation import DIFFERENCES
-from spikecam_env.gap.unit.refit import common_level, constrained_refit, free_refit, noisy_pixels
+from spikecam_env.gap.unit.refit import common_level, constrained_refit, free_refit
 
 
 @pytest.mark.parametrize("seed", [1, 5])
@@ -116,19 +113,3 @@ def test_the_level_of_all_pixels_is_the_mean_of_those_that_do_not_differ():
     assert common_level(hot, errors) == pytest.approx(level, abs=0.03)
     spread = 100.0 * rng.standard_normal(4000)
     assert common_level(spread, errors) == np.median(spread)
-
-
-@pytest.mark.parametrize("errors, counted", [(3.5, True), (7.0, False)])
-def test_pixels_within_five_errors_of_most_share_their_level(errors, counted):
-    """A third of the pixels lies so many standard errors above the others."""
-    values = np.where(np.arange(90) < 30, errors, 0.0)
-    assert common_level(values, np.ones(90)) == pytest.approx(errors / 3 if counted else 0.0)
-
-
-@pytest.mark.parametrize("times, noisy", [(2.2, False), (4.5, True)])
-def test_a_pixel_of_three_times_the_usual_noise_is_left_out_of_the_jitter(times, noisy):
-    square = np.ones((100, len(DIFFERENCES))) * 50.0
-    square[7] *= times
-    seen = SimpleNamespace(square=square, terms=np.full(square.shape, 50), rate=np.full(100, 0.2))
-    found = noisy_pixels(SimpleNamespace(times=seen, irregular=np.zeros(100, bool)))
-    assert found[7] == noisy and not np.delete(found, 7).any()

@@ -6,7 +6,6 @@ from collections import Counter
 from dataclasses import replace
 
 import numpy as np
-import pytest
 import small
 from small import effect, recorded
 
@@ -16,7 +15,7 @@ from spikecam_env.gap.compare.prediction import Prediction, values_of
 from spikecam_env.gap.fit.candidate import Fit
 from spikecam_env.gap.search.round import Round
 from spikecam_env.gap.verdict.comparison import Comparison
-from spikecam_env.gap.verdict.verdict import conclude, is_scattered
+from spikecam_env.gap.verdict.verdict import conclude
 
 LITTLE = 0.15
 """Of the largest deviate of the rates of a recording, left of a statistic that hardly moved."""
@@ -70,10 +69,3 @@ def test_nor_beside_what_no_name_takes():
 
 def test_one_that_the_effect_scatters_is_not():
     assert conclusion(read=100.0).parameters == {}
-
-
-@pytest.mark.parametrize(
-    "ratio, read, scattered", [(1.6, 160.0, True), (1.6, 1.7, False), (5.0, 10.0, False), (5.0, 26.0, True)]
-)
-def test_an_effect_scatters_what_a_refit_of_its_twins_reads_further_off(ratio: float, read: float, scattered: bool):
-    assert is_scattered("reset_noise", {"ratio": ratio}, {"reset_noise": {"ratio": read}}) == scattered

@@ -2,12 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
-from spikecam_env.gap.compare.distance import HEAVY, robust_squares
 from spikecam_env.gap.compare.prediction import TOLERANCE, Null, Prediction
 from spikecam_env.gap.statistics import StatisticKey
 from spikecam_env.gap.verdict.remainder import explains, remainder_of
@@ -38,18 +35,6 @@ def test_a_name_leaves_a_quarter_of_the_squares_of_a_group_at_most(share: float,
     before = off(rates_flat=100.0)
     stays = float(np.sqrt(share / (1.0 - share) * np.sum(before**2)))
     assert explains(NULL, before + beside(rates_flat=stays), given(before)) == explained
-
-
-@pytest.mark.parametrize("share, explained", [(0.03, True), (0.08, False)])
-def test_a_name_leaves_a_twentieth_of_the_deviance_at_most(share: float, explained: bool) -> None:
-    """All statistics are 300 noises off before; one is left at 6, no chance, and the others share the rest evenly."""
-    before, one = np.full(COUNT, 300.0), robust_squares(np.array([6.0]))
-    each = (COUNT + share * (robust_squares(before) - COUNT) - one) / (COUNT - 1)
-    left = np.full(COUNT, np.sqrt(HEAVY * np.expm1(each / (HEAVY + 1.0))))
-    left[0] = 6.0
-    print(f"{left[1]:.1f} noises each")
-    exact = replace(given(before - left), own=np.zeros(COUNT))
-    assert explains(NULL, before, exact) == explained
 
 
 def test_what_is_left_is_not_measured_by_how_well_laws_are_known() -> None:

@@ -2,13 +2,10 @@
 
 from __future__ import annotations
 
-from types import SimpleNamespace
-
 import numpy as np
 import pytest
 
-from spikecam_env.gap.settings import DiagnosisSettings
-from spikecam_env.gap.verdict.score import RULE_OF_THREE, Score, StrengthTest, TwinProbe, linear, linear_score
+from spikecam_env.gap.verdict.score import RULE_OF_THREE, Score, StrengthTest, TwinProbe
 
 
 def test_a_strength_of_which_few_events_are_expected_is_never_refuted():
@@ -28,21 +25,3 @@ def test_what_so_few_events_scatter_counts_however_alike_a_few_campaigns_are():
     alike = np.array([12.0, 12.0, 12.1, 12.0])
     assert TwinProbe.score_variance(score, alike, excess=12.0, events=9.0) == pytest.approx(1.0 + 12.0**2 / 9)
     assert TwinProbe.score_variance(score, alike, excess=12.0, events=np.inf) == pytest.approx(1.0)
-
-
-def test_a_statistic_counts_as_five_noises_off_at_most() -> None:
-    null = SimpleNamespace(mean=np.zeros(2), noise=np.ones(2), settings=DiagnosisSettings())
-    score = [linear_score(null, np.array([1.0, 0.0]), np.array([x, 9.0])) for x in (4.0, 6.0, 100.0, np.nan)]
-    assert score == [4.0, 5.0, 5.0, 0.0]
-
-
-def test_a_statistic_of_unknown_noise_counts_for_nothing() -> None:
-    null = SimpleNamespace(
-        mean=np.zeros(2),
-        noise=np.array([1.0, np.nan]),
-        floor=np.array([0.1, 0.1]),
-        weight=1.0,
-        settings=DiagnosisSettings(),
-    )
-    score = linear(null, np.array([2.0, 2.0]), [np.zeros(2), np.ones(2)], {}, scatter=np.zeros(2))
-    assert score is not None and (score.rise, score.error) == pytest.approx((4.0, 0.2))

@@ -2,16 +2,11 @@
 
 from __future__ import annotations
 
-from types import SimpleNamespace
-
 import numpy as np
-import pytest
 
 from spikecam_env.gap.compare.prediction import Null
-from spikecam_env.gap.report.table_rows import STRUCTURE
 from spikecam_env.gap.statistics import StatisticKey
-from spikecam_env.gap.verdict import structure as module
-from spikecam_env.gap.verdict.structure import level_exponent, structure
+from spikecam_env.gap.verdict.structure import level_exponent
 
 LEVELS = {"flat-0.1": 0.1, "flat-0.2": 0.2, "flat-0.4": 0.4}
 
@@ -29,33 +24,3 @@ def test_of_statistics_seen_on_as_many_flats_the_first_gives_the_exponent() -> N
         exponent = level_exponent(null, off, dict.fromkeys(LEVELS, "flat"), LEVELS)
         print(first, exponent)
         assert exponent == first
-
-
-def made_up(off: dict[tuple[str, str], float]) -> tuple[Null, np.ndarray]:
-    """Statistics off by so many noises, by (group, recording)."""
-    keys = tuple(StatisticKey(group, recording, "mean") for group, recording in off)
-    ones = np.ones(len(keys))
-    return Null(keys, 0 * ones, ones, 0 * ones, np.inf, 100.0), np.array(list(off.values()))
-
-
-@pytest.mark.parametrize("noises, exponent", [(4.0, None), (6.0, 0.0)])
-def test_statistics_clearly_off_on_three_flats_give_an_exponent(noises: float, exponent: float | None) -> None:
-    null, off = made_up({("rates", flat): noises for flat in LEVELS})
-    kind = dict.fromkeys(LEVELS, "flat")
-    assert level_exponent(null, off, kind, LEVELS) == exponent
-    assert level_exponent(null, np.where(np.arange(3) == 0, 0.0, off), kind, LEVELS) is None, "two levels are no law"
-
-
-@pytest.mark.parametrize("rows, extent", [(8.0, "pixel by pixel"), (40.0, "common to many pixels")])
-def test_what_many_pixels_have_in_common_has_its_share_of_the_deviance(rows, extent, monkeypatch) -> None:
-    """Of log(1 + 8) against two of log(1 + 10^2 / 8), 29 %; of log(1 + 40^2 / 8), 50 %."""
-    monkeypatch.setattr(module, "where", lambda case: "")
-    monkeypatch.setattr(module, "when", lambda case: "")
-    case = SimpleNamespace(conditions=[SimpleNamespace(name=n, kind="flat", level=v) for n, v in LEVELS.items()])
-    null, off = made_up({("rows", "flat-0.1"): rows, ("rates", "flat-0.1"): 10.0, ("rates", "flat-0.2"): 10.0})
-    share = np.log1p(off**2 / 8)
-    print(f"{share[0] / share.sum():.2f}")
-    found = structure(case, null, off)
-    assert found["extent"] == extent
-    assert {"light", "level_exponent", "extent", "history", "neighbours", "clock", "where", "when"} <= set(found)
-    assert set(found) - {"worst_group", "groups"} <= set(STRUCTURE), "without words on the page"

@@ -2,16 +2,10 @@
 
 from __future__ import annotations
 
-import numpy as np
 import pytest
 from small import FRAMES, SHAPE, case_from, effect, recorded, spikes_of
 
 from spikecam_env.gap.verdict.where_and_when import (
-    later_half,
-    line_in_one_half,
-    outlying_counts,
-    outlying_means,
-    step_in_the_middle,
     when,
     where,
 )
@@ -76,63 +70,3 @@ def test_a_change_of_the_rate_half_way_is_timed():
 
 def test_an_effect_that_ends_half_way_is_timed():
     assert when(mixed(SOME[0], slice(0, FRAMES // 2))) == "until about half of each recording"
-
-
-NINE = np.repeat(np.arange(9), 100)
-"""(P,) fields of 900 pixels."""
-
-
-@pytest.mark.parametrize("inside, stands_out", [(1.7, False), (2.4, True)])
-def test_a_field_has_to_have_twice_the_irregular_intervals(inside: float, stands_out: bool) -> None:
-    """Of 10 000 a field, so that the noise of counts is no matter."""
-    irregular = np.where(NINE == 4, 100.0 * inside, 100.0)
-    assert outlying_counts(irregular, NINE)[4] == stands_out and not outlying_counts(irregular, NINE)[5]
-
-
-@pytest.mark.parametrize("noises, stands_out", [(6.0, False), (10.0, True)])
-def test_a_field_of_few_irregular_intervals_has_to_stand_out_of_their_noise(noises: float, stands_out: bool) -> None:
-    """Four are expected of a field: eight noises are sixteen more."""
-    irregular = np.full(900, 0.04)
-    irregular[NINE == 4] = (4 + noises * 2) / 100
-    assert outlying_counts(irregular, NINE)[4] == stands_out
-
-
-@pytest.mark.parametrize("off, stands_out", [(0.7e-4, False), (1.4e-4, True)])
-def test_a_field_has_to_be_off_by_more_than_labels_can_be(off: float, stands_out: bool) -> None:
-    assert outlying_means(np.where(NINE == 4, off, 0.0), NINE)[4] == stands_out
-
-
-@pytest.mark.parametrize("off, stands_out", [(6e-3, False), (14e-3, True)])
-def test_a_field_has_to_be_off_by_eight_times_the_scatter_of_the_others(off: float, stands_out: bool) -> None:
-    """The others are at plus and minus 1e-3; of the six nearest to the median, 1e-3, the scatter is 1.15e-3."""
-    values = np.array([1, -1, 1, -1, 0, 1, -1, 1, -1], float)[NINE] * 1e-3
-    values[NINE == 4] = off
-    assert outlying_means(values, NINE)[4] == stands_out
-
-
-def test_halves_have_to_differ_by_noise_and_by_a_share() -> None:
-    of = {d: later_half(np.array([500 - 500 * d, 500 + 500 * d]), 8.0, 0.3) for d in (0.2, 0.4, -0.4)}  # noise: 0.25
-    print(of)
-    assert of == {0.2: [], 0.4: [True], -0.4: [False]}
-    many = {d: later_half(np.array([5e5 * (1 - d), 5e5 * (1 + d)]), 8.0, 0.3) for d in (0.2, 0.4)}
-    assert many == {0.2: [], 0.4: [True]}
-    few = {d: later_half(np.array([50 * (1 - d), 50 * (1 + d)]), 8.0, 0.3) for d in (0.6, 0.9)}  # 6 and 9 noises of 0.1
-    assert few == {0.6: [], 0.9: [True]}
-    pooled = {d: later_half(np.array([50 * (1 - d), 50 * (1 + d)]), 5.0, 0.3) for d in (0.35, 0.6)}
-    assert pooled == {0.35: [], 0.6: [True]}
-
-
-@pytest.mark.parametrize(
-    "first, second, said", [(1, 40, []), (1, 80, [True]), (80, 1, [False]), (200, 800, []), (100, 800, [True])]
-)
-def test_a_line_is_of_one_half_where_it_is_strong_there_and_weak_in_the_other(first, second, said) -> None:
-    assert line_in_one_half(first, second) == said
-
-
-def test_a_step_in_the_middle_has_to_be_beyond_labels_and_explain_the_change() -> None:
-    blocks = np.ones(16)
-    for step, said in ((1.4e-5, []), (3e-5, [True]), (-3e-5, [False])):
-        assert step_in_the_middle(blocks + np.repeat([0.0, step], 8), 8.0) == said
-    for noises, said in ((6.0, []), (10.0, [True])):
-        scatter = np.tile([1e-3, -1e-3], 8)
-        assert step_in_the_middle(blocks + scatter + np.repeat([0.0, noises * 1e-3], 8), 8.0) == said
