@@ -15,6 +15,9 @@ from spikecam_env.sensor import Keyframes
 from spikecam_env.threads import as_many, share_out
 from spikecam_env.types import Floats, Pictures
 
+AT_REST = Gaze.fixed(0.0, 0.0)
+"""The camera where no gaze is given."""
+
 LONGEST_INTERVAL = 64
 """Frames between two keys, at most."""
 

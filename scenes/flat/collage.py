@@ -16,7 +16,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from scenes.keys import side_by_side
+from scenes.keys import AT_REST, LONGEST_INTERVAL, paint_keys
 from scenes.protocol import FRAME_RATES_HZ, MOST_LIGHT, MOST_PLACE, Gaze, Truth
 from scenes.textures import random_texture
 from spikecam_env.checked import checked_number, checked_shape
@@ -26,7 +26,6 @@ from spikecam_env.sensor import Keyframes
 from spikecam_env.types import Floats, Pictures
 
 SHAPES = ("ellipse", "rectangle", "fan")
-LONGEST_KEY = 64  # frames
 MOTION_PER_KEY = 1.0  # pixels; about 1 % rms error of linear light at 1.2
 
 
@@ -84,33 +83,26 @@ class Collage:
         frame = np.arange(first, last + 1) * float(self.key_every)
         if gaze is not None:
             frame = np.union1d(frame[(frame > start) & (frame < stop)], [start, stop])
-        light = np.empty((len(frame), *self.shape), np.float32)
-
-        def paint(key: int) -> None:
-            self._paint(light[key], float(frame[key]), _offset(float(frame[key]), gaze))
-
-        side_by_side(paint, len(frame))
-        return Keyframes(frame.astype(np.float64), light)
+        camera = gaze or AT_REST
+        return paint_keys(self.shape, frame, lambda t, picture: self._paint(picture, t, camera.at(t)))
 
     def truth(self, frame: float, gaze: Gaze | None = None) -> Truth:
         """Radiance, flow [pixels/frame] and object number (0: background, then the shapes from the back)."""
         radiance, owner = np.empty(self.shape, np.float32), np.zeros(self.shape, np.int32)
-        self._paint(radiance, frame, _offset(frame, gaze), owner)
+        camera = gaze or AT_REST
+        offset = camera.at(frame)
+        self._paint(radiance, frame, offset, owner)
         flow = np.empty((*self.shape, 2), np.float32)
         for number, layer in enumerate((self._background, *self._shapes)):
             mine = owner == number
-            flow[mine] = layer.velocity_at(frame, _offset(frame, gaze), self.shape)[mine]
-        if gaze is not None:
-            flow -= np.asarray(gaze.rate, np.float32)
-        poses = {
-            f"shape-{number}": layer.pose(frame, _offset(frame, gaze), self.shape)
-            for number, layer in enumerate(self._shapes, 1)
-        }
-        return Truth(radiance, flow, owner, None, poses | {"camera": _offset(frame, gaze)})
+            flow[mine] = layer.velocity_at(frame, offset, self.shape)[mine]
+        flow -= np.asarray(camera.rate, np.float32)
+        poses = {f"shape-{n}": layer.pose(frame, offset, self.shape) for n, layer in enumerate(self._shapes, 1)}
+        return Truth(radiance, flow, owner, None, poses | {"camera": offset})
 
     def places(self, frame: float, gaze: Gaze | None = None) -> dict[str, tuple[float, float]]:
         """Where the shapes' middles are seen, see `scenes.protocol.Placed`."""
-        offset = _offset(frame, gaze)
+        offset = (gaze or AT_REST).at(frame)
         return {f"shape-{n}": layer.pose(frame, offset, self.shape)[:2] for n, layer in enumerate(self._shapes, 1)}
 
     def _paint(
@@ -263,11 +255,7 @@ def _mask(kind: str, half_width: float, half_height: float, blades: int) -> Pict
 
 def _key_every(fastest: float) -> int:
     """Frames between keys: the largest power of two with at most MOTION_PER_KEY of motion."""
-    every = LONGEST_KEY
+    every = LONGEST_INTERVAL
     while every > 1 and every * fastest > MOTION_PER_KEY:
         every //= 2
     return every
-
-
-def _offset(frame: float, gaze: Gaze | None) -> tuple[float, float]:
-    return (0.0, 0.0) if gaze is None else gaze.at(frame)

@@ -24,6 +24,7 @@ from numpy.typing import ArrayLike
 
 from scenes.flat.painted_disk import PlacedDisc, Plane, Texels, paint_tile, prefiltered
 from scenes.flat.planes import MovingDisc, PlanarScene
+from scenes.keys import AT_REST
 from scenes.protocol import FRAME_RATES_HZ, MOST_LIGHT, MOST_PLACE, Gaze
 from scenes.textures import Texture, dead_leaves, fractal_noise
 from spikecam_env.checked import LARGEST_DERIVED_SEED, checked_number, checked_seed, checked_shape
@@ -158,7 +159,7 @@ class RotatingDisk(PlanarScene):
     def centre_at(self, frame: Any, gaze: Gaze | None = None) -> tuple[Any, Any]:
         """(x, y) of the disk's centre in the picture at a frame, or at each of several [pixels]."""
         seconds = frame / self.frame_rate_hz
-        pan, tilt = (gaze or _AT_REST).at(frame)
+        pan, tilt = (gaze or AT_REST).at(frame)
         return (
             self.centre[0] + self.drift_px_s[0] * seconds - pan,
             self.centre[1] + self.drift_px_s[1] * seconds - tilt,
@@ -211,9 +212,6 @@ def disk_texture(rng: np.random.Generator, size: int = 1024) -> Texture:
     fill(0.93, 1.00, _sectors(turn, 144))
     fill(1.00, 2.00, 0.5)
     return np.asarray(cv2.resize(image, (size, size), interpolation=cv2.INTER_AREA), np.float32)
-
-
-_AT_REST = Gaze.fixed(0.0, 0.0)
 
 
 def _sectors(turn: Pictures, count: int) -> Pictures:

@@ -13,14 +13,12 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from scenes.flat.painted_disk import PlacedDisc, Plane, paint_scenes, parts_of, places_of
-from scenes.keys import interval_for, key_frames, threads_for
+from scenes.keys import AT_REST, interval_for, key_frames, threads_for
 from scenes.protocol import Gaze, Truth
 from spikecam_env.sensor import Keyframes
 from spikecam_env.sensor.compiled_tools.intrinsics import address_of
 from spikecam_env.threads import together
 from spikecam_env.types import Floats, Pictures
-
-_AT_REST = Gaze.fixed(0.0, 0.0)
 
 
 class MovingDisc(NamedTuple):
@@ -60,11 +58,11 @@ class PlanarScene:
     def plane(self, start: int, stop: int, gaze: Gaze | None = None) -> Plane:
         """The plane at the keys that cover frames [start, stop]."""
         interval = interval_for(self.speed() + (float(np.hypot(*gaze.rate)) if gaze else 0.0), self.motion_per_key)
-        return self.plane_at(key_frames(self.shape, start, stop, interval, gaze), gaze or _AT_REST)
+        return self.plane_at(key_frames(self.shape, start, stop, interval, gaze), gaze or AT_REST)
 
     def truth(self, frame: float, gaze: Gaze | None = None) -> Truth:
         """Ground truth at a frame: object n is the n-th disc, poses[name] its (x, y, angle); see `protocol.Truth`."""
-        gaze = gaze or _AT_REST
+        gaze = gaze or AT_REST
         radiance = painted_planes([self.plane_at(np.array([frame], np.float64), gaze)])[0].radiance[0]
         flow, owner = np.zeros((*self.shape, 2)), np.zeros(self.shape, np.int32)
         poses: dict[str, tuple[float, ...]] = {}
@@ -81,7 +79,7 @@ class PlanarScene:
 
     def places(self, frame: float, gaze: Gaze | None = None) -> dict[str, tuple[float, float]]:
         """Where the discs' middles are seen, see `scenes.protocol.Placed`."""
-        pan, tilt = (gaze or _AT_REST).at(frame)
+        pan, tilt = (gaze or AT_REST).at(frame)
         return {name: (d.centre[0] - pan, d.centre[1] - tilt) for name, d in self.placed_discs(frame).items()}
 
     def radiance(self, start: int, stop: int, gaze: Gaze | None = None, *, device: Any = None) -> Keyframes:

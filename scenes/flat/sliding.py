@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from scenes.keys import interval_for, key_frames, paint_keys
+from scenes.keys import AT_REST, interval_for, key_frames, paint_keys
 from scenes.protocol import FRAME_RATES_HZ, MOST_LIGHT, MOST_PLACE, Gaze, Truth
 from scenes.textures import dead_leaves
 from spikecam_env.checked import checked_memory, checked_number, checked_shape
@@ -86,7 +86,7 @@ class SlidingTexture:
         radiance = np.empty(self.shape, np.float32)
         self._paint(frame, gaze, radiance)
         flow = np.broadcast_to(np.asarray(self.velocity(gaze), np.float32), (*self.shape, 2)).copy()
-        camera = gaze.at(frame) if gaze else (0.0, 0.0)
+        camera = (gaze or AT_REST).at(frame)
         return Truth(
             radiance,
             flow,
@@ -102,14 +102,14 @@ class SlidingTexture:
 
     def velocity(self, gaze: Gaze | None = None) -> tuple[float, float]:
         """(x, y) in the picture [pixels/frame]."""
-        pan, tilt = gaze.rate if gaze else (0.0, 0.0)
+        pan, tilt = (gaze or AT_REST).rate
         return self.velocity_px_s[0] / self.frame_rate_hz - pan, self.velocity_px_s[1] / self.frame_rate_hz - tilt
 
     def corner_at(self, frame: Any, gaze: Gaze | None = None) -> tuple[Any, Any]:
         """(x, y) in the picture of the texture's upper left corner [pixels], at a frame or at each of several; it
         started at (-0.5, -0.5)."""
         seconds = frame / self.frame_rate_hz
-        pan, tilt = gaze.at(frame) if gaze else (0.0, 0.0)
+        pan, tilt = (gaze or AT_REST).at(frame)
         return self.velocity_px_s[0] * seconds - pan - 0.5, self.velocity_px_s[1] * seconds - tilt - 0.5
 
     def _first_sample(self, frame: Any, gaze: Gaze | None) -> tuple[Any, Any]:

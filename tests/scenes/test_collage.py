@@ -6,7 +6,8 @@ import cv2
 import numpy as np
 import pytest
 
-from scenes.flat.collage import LONGEST_KEY, MOTION_PER_KEY, Collage
+from scenes.flat.collage import MOTION_PER_KEY, Collage
+from scenes.keys import LONGEST_INTERVAL
 from scenes.protocol import Gaze
 from spikecam_env.errors import InputError
 
@@ -39,7 +40,7 @@ def test_keys_are_the_truth():
 @pytest.mark.parametrize("speed", [0.0, 0.1, 2.0])
 def test_motion_between_keys_is_bounded(speed):
     scene = Collage(SHAPE, 5, speed=speed)
-    assert scene.key_every <= LONGEST_KEY
+    assert scene.key_every <= LONGEST_INTERVAL
     fastest = np.linalg.norm(scene.truth(10.0).flow, axis=-1).max()
     print(f"fastest pixel {fastest:.3f}, keys every {scene.key_every}")
     assert scene.key_every == 1 or scene.key_every * fastest <= MOTION_PER_KEY
