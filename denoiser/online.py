@@ -357,6 +357,6 @@ def pieces_of(
         for start in range(0, len(spikes) + chunk, chunk):
             piece: Any = online.push(spikes[start : start + chunk]) if start < len(spikes) else online.flush()
             yield first, piece
-            count = len(piece[0] if online.output == "both" else piece)
+            count = len(piece[0] if isinstance(piece, tuple) else piece)
             first += count
             bar.update(count)
