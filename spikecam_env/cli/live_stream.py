@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
@@ -127,17 +126,16 @@ class Live:
             if not source.waits and self.speed is not None:
                 raise InputError(f"--speed {self.speed:g}: {source.title} has a pace of its own; leave --speed")
             if isinstance(source, StoredFrames):
-                _warn_of_slow_reading(source, self.speed or 1.0)
+                _say_if_read_slowly(source, self.speed or 1.0)
             yield source
 
 
-def _warn_of_slow_reading(source: StoredFrames, speed: float) -> None:
+def _say_if_read_slowly(source: StoredFrames, speed: float) -> None:
     rate, needed = source.read_rate(), speed * source.frame_rate_hz
     if rate < READ_AHEAD * needed:
-        warnings.warn(
+        print(
             f"{source.title} is read at {rate:.0f} frames a second, and {needed:.0f} are needed beside the network: "
             f"frames will be lost; give --speed {rate / READ_AHEAD / source.frame_rate_hz:.1g}, or a .dat file, which "
             "is read several times as fast",
-            UserWarning,
-            stacklevel=2,
+            flush=True,
         )
