@@ -39,6 +39,8 @@ class ManyDnSS:
             raise InputError("overlap is True; many streams are denoised by one chain of passes each, leave it False")
         self._like, self.shape = like, checked_shape(shape)
         self._passes = passes_of(like.engine, self.shape, checked_count(streams, "streams"))
+        self.finished = np.zeros(len(self), np.int64)
+        """(N,) frame after the newest output of each stream; 0 before the first."""
 
     def __len__(self) -> int:
         return len(self._passes)
@@ -51,6 +53,7 @@ class ManyDnSS:
     def restart(self, which: NDArray[np.bool_]) -> None:
         """Forget these streams (N,): others begin in their place."""
         self._passes.restart(which)
+        self.finished[which] = 0
 
     def exchange(self, which: NDArray[np.bool_], others: ManyDnSS) -> None:
         """Put the streams of others, mid-way, in the place of some of these.
@@ -63,6 +66,7 @@ class ManyDnSS:
             InputError: where the denoiser is on a device.
         """
         self._passes.exchange(which, others._passes)
+        self.finished[which] = others.finished
 
     def push(self, spikes: Any) -> list[Any]:
         """(N, K, H, W) uint8 more frames of every stream -> N times the frames (F, H, W) they complete; F may be 0.
@@ -76,9 +80,16 @@ class ManyDnSS:
         device = self._like.device
         if device is None:
             nothing = np.empty((0, *self.shape), np.float32)
-            return [np.concatenate([nothing, *(r for _, r in its)]) for its in self._passes.push(spikes)]
+            return [np.concatenate([nothing, *(r for _, r in its)]) for its in self._finish(self._passes.push(spikes))]
         new = spikes if isinstance(spikes, torch.Tensor) else torch.from_numpy(spikes)
         none = torch.empty((0, *self.shape), device=device)
-        done: list[list[tuple[int, Any]]] = self._passes.push(new.to(device))
-        rates = [torch.cat([none, *(r for _, r in its)]) for its in done]
+        rates = [torch.cat([none, *(r for _, r in its)]) for its in self._finish(self._passes.push(new.to(device)))]
         return rates if new is spikes else [on_host(its) for its in rates]
+
+    def _finish(self, done: list[list[tuple[int, Any]]]) -> list[list[tuple[int, Any]]]:
+        """These passes, once noted."""
+        for n, passes in enumerate(done):
+            if passes:
+                start, rates = passes[-1]
+                self.finished[n] = start + len(rates)
+        return done

@@ -1,6 +1,9 @@
 """The denoised picture as an observation: the newest rate plane that the denoiser has finished.
 
-    picture = 255 * rate / `white`      rate: [spikes/frame], of a frame that is `age` frames old (`best`: 17 to 32)
+    picture = 255 * rate / `white`      rate: [spikes/frame], of a frame that is `age` frames old
+
+By default that is the picture of mode `picture`, one a step, at a small share of the cost of other modes; its age is 13
+frames.  Of `best` it is 17 to 32.
 
 Before the first plane is finished agents see the noisy rate of all frames so far (TFP), and the age is -1.
 """
@@ -19,7 +22,9 @@ from numpy.typing import NDArray
 
 from denoiser.many import ManyDnSS
 from denoiser.online import OnlineDnSS
-from denoiser.passes.recipe import RECIPES
+from denoiser.passes.picture_window import STEPS
+from denoiser.passes.recipe import MODES, PictureRecipe
+from denoiser.weights import load_weights
 from spikecam_env.checked import checked_number
 from spikecam_env.envs.observations.protocol import Blocks, CameraView, Observation, grey, picture_space
 from spikecam_env.types import Masks
@@ -33,8 +38,8 @@ class Rate(Observation):
         InputError: `white` is not above 0; or, when an episode begins, the mode is unknown or its checkpoint unusable.
     """
 
-    mode: str | os.PathLike[str] = "best"
-    """"best", "fast", "paper", or the path of a checkpoint (.pt)."""
+    mode: str | os.PathLike[str] | None = None
+    """"picture", "best", "fast", "paper", or the path of a checkpoint (.pt); default: "picture", on a device "best"."""
     white: float = field(default=1.0, kw_only=True)
     """[spikes/frame]; eight bits round a rate below a 500th of it to 0."""
 
@@ -49,9 +54,10 @@ class Rate(Observation):
 
     def start(self, view: CameraView, streams: int) -> Denoising:
         if view.device is not None:
-            many = ManyDnSS(_denoiser(self.mode, str(view.device)), streams, view.shape)
-            return DenoisingOnDevice(many, self.white, view.device)
-        return Denoising(ManyDnSS(_denoiser(self.mode), streams, view.shape), self.white)
+            online = _denoiser("best" if self.mode is None else self.mode, device=str(view.device))
+            return DenoisingOnDevice(ManyDnSS(online, streams, view.shape), self.white, view.device)
+        online = _denoiser("picture" if self.mode is None else self.mode, step=_step(view.frames_per_step))
+        return Denoising(ManyDnSS(online, streams, view.shape), self.white)
 
     def step(self, blocks: Blocks, state: Denoising) -> tuple[NDArray[np.uint8], Denoising]:
         spikes: Any = blocks.spikes
@@ -72,8 +78,11 @@ class Denoising:
         self._picture: Any = np.zeros((streams, 1, *shape), np.uint8)
         self.pushed = np.zeros(streams, np.int64)
         """(N,) frames that went in."""
-        self.finished = np.zeros(streams, np.int64)
-        """(N,) frames that came out."""
+
+    @property
+    def finished(self) -> NDArray[np.int64]:
+        """(N,) frame after the newest that came out; 0 before the first."""
+        return self._denoiser.finished
 
     def restarted(self, which: Masks) -> Denoising:
         """This, with these streams before their first frame."""
@@ -91,14 +100,13 @@ class Denoising:
 
     @property
     def _arrays(self) -> tuple[Any, ...]:
-        return self._fired, self._picture, self.pushed, self.finished
+        return self._fired, self._picture, self.pushed
 
     def seen(self, spikes: Any) -> Any:
         """(N, K, H, W) more frames -> (N, 1, H, W) the pictures after them."""
         self.pushed += spikes.shape[1]
         self._fired += spikes.sum(axis=1, dtype=np.int64)
         for stream, rates in enumerate(self._denoiser.push(spikes)):
-            self.finished[stream] += len(rates)
             if len(rates):
                 self._picture[stream, 0] = grey(rates[-1] / self._white)
         noisy = grey(self._fired / (self._white * np.maximum(self.pushed, 1)[:, None, None]))[:, None]
@@ -118,7 +126,6 @@ class DenoisingOnDevice(Denoising):
         self._fired += spikes.sum(dim=1)
         rates = self._denoiser.push(spikes)
         finish = [stream for stream, its in enumerate(rates) if len(its)]
-        self.finished += [len(its) for its in rates]
         if finish:
             newest: Any = torch.stack([rates[stream][-1] for stream in finish])
             self._picture[finish, 0] = torch.as_tensor(grey(newest / self._white))
@@ -129,13 +136,22 @@ class DenoisingOnDevice(Denoising):
         return torch.where(finished[:, None] > 0, self._picture, noisy)
 
 
-def _denoiser(mode: Any, device: str | None = None) -> OnlineDnSS:
-    if isinstance(mode, str) and mode in RECIPES:
-        return _shipped(mode, device)
-    return OnlineDnSS.from_file(mode, output="rate", device=device)
+def _step(frames_per_step: int) -> int:
+    """Frames from a picture to the next: those of a step of the environment, as nearly as there are such networks."""
+    least, most = STEPS
+    return min(frames_per_step * -(-least // frames_per_step), most)
 
 
-@lru_cache(maxsize=2 * len(RECIPES))
-def _shipped(mode: str, device: str | None) -> OnlineDnSS:
-    """Read once a process: an episode begins in the time of a step."""
-    return OnlineDnSS.pretrained(mode, output="rate", device=device)
+def _denoiser(mode: str | os.PathLike[str], **options: Any) -> OnlineDnSS:
+    """Of a mode that is shipped, read once a process: an episode begins in the time of a step."""
+    if isinstance(mode, str) and mode in MODES:
+        return _shipped(mode, **options if mode == "picture" or "device" in options else {})
+    recipe, network, _ = load_weights(mode)
+    if not isinstance(recipe, PictureRecipe):
+        options.pop("step", None)
+    return OnlineDnSS(recipe, network, output="rate", **options)
+
+
+@lru_cache(maxsize=4 * len(MODES))
+def _shipped(mode: str, **options: Any) -> OnlineDnSS:
+    return OnlineDnSS.pretrained(mode, output="rate", **options)

@@ -28,7 +28,7 @@ from denoiser.passes.infer import on_host
 from denoiser.passes.on_device import spikes_on, unpacked_on
 from denoiser.passes.passes import Passes, passes_of
 from denoiser.passes.pixel_map import PixelMap
-from denoiser.passes.recipe import Recipe
+from denoiser.passes.recipe import AnyRecipe
 from denoiser.passes.window import check_like
 from denoiser.weights import digest, load_weights, pretrained_path
 from spikecam_env.calibration import Calibration
@@ -55,7 +55,8 @@ class OnlineDnSS:
         recipe: of the network.
         network: of the recipe.  A module of another class that takes and gives the same, as `torch.compile(network)`,
             is called as in training; `spikecam bench loop` prints by how much a pass is then slower.
-        output: "spikes", "rate" (the network's plane, cut to [0, 1]) or "both".
+        output: "spikes", "rate" (the network's plane, cut to [0, 1]) or "both"; default: "spikes", and "rate" of a
+            network of one picture a step, which gives nothing else.
         stride: `paper` mode only: evaluate every stride-th plane and hold it in between (faster; worse when things
             move).
         precision: of the network; "auto" is bfloat16 where the processor (the GPU, with `device`) has it, else float32.
@@ -69,6 +70,8 @@ class OnlineDnSS:
         device: `best` mode only: windows, planes and network as tensors there, "cuda", "cuda:1" or "cpu"
             (`on_device.py`).  In float32 rates differ by less than 1e-5 from those without.  Spikes, and the mean
             of `overlap`, are made of them on the host.  Default: windows on the processor, in compiled code.
+        step: `picture` mode only: frames from a picture to the next, 8 to 4000; default 40.
+        look: `picture` mode only: age of a picture, 4 to 24 frames; default 12.
 
     Raises:
         InputError: unknown options, a network of another recipe or without finite weights, and unusable spikes.
@@ -79,14 +82,19 @@ class OnlineDnSS:
         >>> spikes = (np.random.default_rng(0).random((64, 16, 24)) < 0.2).astype(np.uint8)
         >>> [online.push(block).shape for block in (spikes[:32], spikes[32:])], online.flush().shape
         ([(16, 16, 24), (32, 16, 24)], (16, 16, 24))
+
+        One picture a step, of the frame 12 before the newest:
+
+        >>> OnlineDnSS.pretrained("picture", step=16).push(spikes).shape
+        (4, 16, 24)
     """
 
     def __init__(
         self,
-        recipe: Recipe,
+        recipe: AnyRecipe,
         network: nn.Module,
         *,
-        output: str = "spikes",
+        output: str | None = None,
         stride: int = 1,
         precision: str = "auto",
         engine: str = "torch",
@@ -94,16 +102,21 @@ class OnlineDnSS:
         unit: PixelMap | Calibration | tuple[ArrayLike, ArrayLike] | str | os.PathLike[str] | None = None,
         overlap: bool = False,
         device: str | torch.device | None = None,
+        step: int | None = None,
+        look: int | None = None,
     ) -> None:
-        self.output = _checked_output(output)
         self.engine = Engine.of(
-            recipe, network, precision=precision, kind=engine, stride=stride, unit=unit, device=device
-        )
+            recipe, network, precision=precision, kind=engine, stride=stride, unit=unit, device=device, step=step,
+            look=look,
+        )  # fmt: skip
+        self.output = self._checked_output(output)
         """The network, ready for passes."""
         if decoder is not None and (not isinstance(decoder, str) or decoder not in _DECODERS):
             raise unknown_name("decoder", decoder, _DECODERS)
         if not isinstance(overlap, bool):
             raise InputError(f"overlap is {overlap!r}; it must be True or False")
+        if decoder is not None and recipe.decoder is None:
+            raise InputError(f"decoder is {decoder!r}; a network of one picture a step has no spikes, leave it out")
         if overlap and recipe.layout.planes % 2:
             raise InputError("overlap is True; passes of this network cannot overlap by half, leave it False")
         self._overlap = overlap
@@ -113,7 +126,7 @@ class OnlineDnSS:
 
     @classmethod
     def pretrained(cls, mode: str = "best", **options: Any) -> OnlineDnSS:
-        """With the shipped weights of a mode, "best", "fast" or "paper"."""
+        """With the shipped weights of a mode, "best", "fast", "paper" or "picture"."""
         return cls.from_file(pretrained_path(mode), **options)
 
     @classmethod
@@ -126,7 +139,7 @@ class OnlineDnSS:
         """A denoiser like this one for another stream, from its first frame, with the same weights; by default the same
         output."""
         other = copy.copy(self)
-        other.output = self.output if output is None else _checked_output(output)
+        other.output = self.output if output is None else self._checked_output(output)
         other.reset()
         return other
 
@@ -159,7 +172,7 @@ class OnlineDnSS:
         return self.engine.device
 
     def push(self, spikes: ArrayLike | torch.Tensor) -> Denoised:
-        """(K, H, W) more spike frames, 0 or 1, K >= 0 -> the frames that they complete (perhaps none)."""
+        """(K, H, W) more spike frames, 0 or 1, K >= 0 -> the frames, or pictures, that they complete (perhaps none)."""
         return self._pushed(spikes, as_tensors=isinstance(spikes, torch.Tensor))
 
     def push_packed(self, packed: NDArray[np.uint8] | torch.Tensor, shape: tuple[int, int]) -> Denoised:
@@ -238,14 +251,14 @@ class OnlineDnSS:
         firsts = (0, planes // 2) if self._overlap else (0,)
         self._passes = [passes_of(self.engine, shape, first=first) for first in firsts]
         self._mixing = Crossfade(planes, shape) if self._overlap else None
-        self._decoding = _DECODERS[self._decoder].start(shape)
+        self._decoding = None if self._decoder is None else _DECODERS[self._decoder].start(shape)
 
     def _go_on(self, state: dict[str, Any]) -> None:
         for passes, its in zip(self._passes, state["chains"], strict=True):
             passes.restore(its)
         if self._mixing is not None:
             self._mixing.restore(state["mixing"])
-        for found, ours in zip(state["decoding"], self._decoding, strict=True):
+        for found, ours in zip(state["decoding"] or (), self._decoding or (), strict=True):
             check_like(found, ours, "decoding")
         self._decoding = copy.deepcopy(state["decoding"])
         self._ended = bool(state["ended"])
@@ -272,6 +285,9 @@ class OnlineDnSS:
     def _decoded(self, done: list[list[tuple[int, Pictures]]], shape: tuple[int, int]) -> Denoised:
         rates, spikes = [np.empty((0, *shape), np.float32)], [np.empty((0, *shape), np.uint8)]
         for rate in self._mixed(done):
+            if self._decoder is None:
+                rates.append(rate)
+                continue
             fired, self._decoding = _DECODERS[self._decoder].step(rate, self._decoding)
             rates.append(rate)
             spikes.append(fired)
@@ -286,6 +302,16 @@ class OnlineDnSS:
             self._mixing.add(start, rate)
         return [self._mixing.take(min(passes.covered for passes in self._passes))]
 
+    def _checked_output(self, output: str | None) -> str:
+        one_picture = self.engine.recipe.decoder is None
+        if output is None:
+            return "rate" if one_picture else "spikes"
+        if not isinstance(output, str) or output not in OUTPUTS:
+            raise unknown_name("output", output, OUTPUTS)
+        if one_picture and output != "rate":
+            raise InputError(f"output is {output!r}; a network of one picture a step gives 'rate' alone")
+        return output
+
     def _checked(self, spikes: ArrayLike | torch.Tensor) -> Any:
         """The frames as an array, or as a tensor on the device."""
         chunk: Any = as_spikes(spikes) if self.device is None else spikes_on(spikes, self.device)
@@ -299,12 +325,6 @@ class OnlineDnSS:
                 "call reset() to begin a stream of another size"
             )
         return chunk
-
-
-def _checked_output(output: str) -> str:
-    if not isinstance(output, str) or output not in OUTPUTS:
-        raise unknown_name("output", output, OUTPUTS)
-    return output
 
 
 def denoise(spikes: ArrayLike, mode: str = "best", *, chunk: int = 256, **options: Any) -> Denoised:

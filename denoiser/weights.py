@@ -24,15 +24,16 @@ from torch import Tensor, nn
 from denoiser.ground.plain_torch import read_plain, tensors_like
 from denoiser.ground.torch_threads import where_torch_can
 from denoiser.networks.reconstructor_recipe import LEARNED, ReconstructorRecipe
-from denoiser.passes.recipe import RECIPES, Recipe
+from denoiser.passes.recipe import MODES, PictureRecipe, Recipe, recipe_from
+from denoiser.passes.recipe import AnyRecipe as DenoiserRecipe
 from spikecam_env.errors import InputError, shown, unknown_name
 from spikecam_env.whole import whole_file
 
 FORMAT = "spikecam-denoiser/1"
 RECONSTRUCTOR_FORMAT = "spikecam-reconstructor/1"
 
-AnyRecipe: TypeAlias = Recipe | ReconstructorRecipe
-R = TypeVar("R", Recipe, ReconstructorRecipe)
+AnyRecipe: TypeAlias = DenoiserRecipe | ReconstructorRecipe
+R = TypeVar("R", bound=AnyRecipe)
 
 
 def save_weights(
@@ -40,7 +41,7 @@ def save_weights(
 ) -> None:
     """Write a checkpoint of a denoiser or a reconstructor; the file appears whole."""
     state = {name: tensor.detach().cpu().contiguous() for name, tensor in network.state_dict().items()}
-    if isinstance(recipe, Recipe):
+    if isinstance(recipe, Recipe | PictureRecipe):
         names = {"format": FORMAT, "mode": mode}
     else:
         names = {"format": RECONSTRUCTOR_FORMAT, "name": mode}
@@ -49,7 +50,7 @@ def save_weights(
     write_whole(path, data | {"sha256": digest(recipe, state)})
 
 
-def load_weights(path: str | os.PathLike[str]) -> tuple[Recipe, nn.Module, dict[str, Any]]:
+def load_weights(path: str | os.PathLike[str]) -> tuple[DenoiserRecipe, nn.Module, dict[str, Any]]:
     """Read a checkpoint, or the weights of a mode that ship.  Warns where it has no digest.
 
     Args:
@@ -62,7 +63,7 @@ def load_weights(path: str | os.PathLike[str]) -> tuple[Recipe, nn.Module, dict[
         InputError: a missing or damaged file, a file of another kind, weights of another network, and weights that are
             not finite or not those of the digest.
     """
-    return where_torch_can(lambda: read_checkpoint(weights_path(path), FORMAT, Recipe.from_dict))
+    return where_torch_can(lambda: read_checkpoint(weights_path(path), FORMAT, recipe_from))
 
 
 def load_reconstructor(path: str | os.PathLike[str]) -> tuple[ReconstructorRecipe, nn.Module, dict[str, Any]]:
@@ -84,7 +85,7 @@ def digest(recipe: AnyRecipe, weights: Mapping[str, Tensor]) -> str:
 
 def pretrained_path(mode: str) -> Path:
     """Where the shipped weights of a mode are."""
-    return _shipped("denoiser mode", mode, RECIPES)
+    return _shipped("denoiser mode", mode, MODES)
 
 
 def reconstructor_path(name: str) -> Path:
@@ -101,11 +102,11 @@ def _shipped(what: str, name: Any, known: Collection[str]) -> Path:
 def weights_path(weights: Any) -> Path:
     """Path of weights that are given by path or by the name of a mode; InputError for another object, a network for
     one."""
-    if isinstance(weights, str) and weights in RECIPES:
+    if isinstance(weights, str) and weights in MODES:
         return pretrained_path(weights)
     if not isinstance(weights, str | os.PathLike):
         raise InputError(
-            f"weights are given as a {type(weights).__name__}; give {', '.join(RECIPES)} or the path of a checkpoint"
+            f"weights are given as a {type(weights).__name__}; give {', '.join(MODES)} or the path of a checkpoint"
         )
     return Path(weights)
 

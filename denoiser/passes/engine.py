@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, TypeAlias, cast
 
 import torch
 from numpy.typing import ArrayLike
@@ -13,23 +14,36 @@ from torch import nn
 from denoiser.ground.number_type import PRECISIONS, number_type
 from denoiser.passes import infer
 from denoiser.passes.given_network import check_network, has_passes
+from denoiser.passes.picture_pass import pictures_of
+from denoiser.passes.picture_window import (
+    LOOKS,
+    STEPS,
+    TYPICAL_LOOK,
+    TYPICAL_STEP,
+    PictureInput,
+    PictureLayout,
+    PictureWindow,
+)
 from denoiser.passes.pixel_map import PixelMap
-from denoiser.passes.recipe import Recipe
-from denoiser.passes.window import PassWindow
+from denoiser.passes.recipe import AnyRecipe, PictureRecipe
+from denoiser.passes.window import PassWindow, RollingWindow
 from spikecam_env.calibration import Calibration
-from spikecam_env.checked import checked_count
+from spikecam_env.checked import checked_count, checked_whole
 from spikecam_env.errors import InputError, unknown_name
 from spikecam_env.sensor.kernels.cuda import checked_device
 from spikecam_env.types import Pictures
 
 ENGINES = ("torch", "captured")
 
+AnyWindow: TypeAlias = RollingWindow | PictureWindow
+AnyInput: TypeAlias = PassWindow | PictureInput
+
 
 @dataclass(frozen=True)
 class Engine:
     """A network, and how it is run."""
 
-    recipe: Recipe
+    recipe: AnyRecipe
     network: nn.Module
     """As `infer.prepared` makes it, on the device."""
     type: torch.dtype
@@ -42,11 +56,15 @@ class Engine:
     """The calibration map."""
     device: torch.device | None = None
     """Of windows, planes and network; None: on the processor, in compiled code."""
+    step: int = TYPICAL_STEP
+    """Frames from a picture to the next, of mode `picture`."""
+    look: int = TYPICAL_LOOK
+    """Age of its pictures [frames]."""
 
     @classmethod
     def of(
         cls,
-        recipe: Recipe,
+        recipe: AnyRecipe,
         network: nn.Module,
         *,
         precision: str = "auto",
@@ -54,6 +72,8 @@ class Engine:
         stride: int = 1,
         unit: PixelMap | Calibration | tuple[ArrayLike, ArrayLike] | str | os.PathLike[str] | None = None,
         device: str | torch.device | None = None,
+        step: int | None = None,
+        look: int | None = None,
     ) -> Engine:
         """A copy of a network, with the options of `OnlineDnSS`; InputError for those that do not fit it."""
         check_network(recipe, network)
@@ -68,6 +88,13 @@ class Engine:
         if unit is not None and not recipe.layout.gain_memory:
             raise InputError("this network takes no calibration map; leave unit out, or use mode 'best'")
         unit = None if unit is None else PixelMap.of(unit)
+        one_picture = isinstance(recipe, PictureRecipe)
+        if not one_picture and (step, look) != (None, None):
+            raise InputError("step and look are of mode 'picture'; this network gives every frame, leave them out")
+        if one_picture and (device is not None or stride != 1):
+            raise InputError("a network of one picture a step takes no device and no stride; leave them out")
+        step = checked_whole(TYPICAL_STEP if step is None else step, "step", *STEPS)
+        look = checked_whole(TYPICAL_LOOK if look is None else look, "look", *LOOKS)
         place = None if device is None else checked_device(device, "leave device out")
         if kind == "captured" and place is None:
             raise InputError("engine 'captured' replays passes on a device; give one, device='cuda', or take 'torch'")
@@ -75,11 +102,22 @@ class Engine:
         network = infer.prepared(network, its_type)
         if place is not None:
             network = _moved(network, place)
-        return cls(recipe, network, its_type, kind, int(stride), unit, place)
+        return cls(recipe, network, its_type, kind, int(stride), unit, place, step, look)
 
-    def run(self, windows: list[PassWindow], carried: list[infer.Carried]) -> list[tuple[Pictures, infer.Carried]]:
+    def window(self, shape: tuple[int, int]) -> AnyWindow:
+        """The window of a stream of frames of `shape`, before its first frame."""
+        layout = self.recipe.layout
+        if isinstance(layout, PictureLayout):
+            return PictureWindow(layout, shape, self.unit, self.step, self.look)
+        return RollingWindow(layout, shape, self.unit)
+
+    def run(
+        self, windows: Sequence[AnyInput], carried: Sequence[infer.Carried], shape: tuple[int, int]
+    ) -> list[tuple[Pictures, infer.Carried]]:
         """Rates of the windows of as many streams, and the carried arrays of each, in one pass of the network."""
-        return infer.rates_of_many(self.network, windows, self.type, carried)
+        if isinstance(self.recipe, PictureRecipe):
+            return pictures_of(self.network, cast("Sequence[PictureInput]", windows), carried, shape, self.type)
+        return infer.rates_of_many(self.network, cast("Sequence[PassWindow]", windows), self.type, carried)
 
     def check_map(self, shape: tuple[int, int]) -> None:
         """InputError where the calibration map has another shape."""
@@ -93,6 +131,7 @@ class Engine:
             "precision": "bfloat16" if self.type == torch.bfloat16 else "float32",
             "engine": self.kind if self.device is None else f"{self.kind} on {self.device.type}",
             "calibration map": None if self.unit is None else self.unit.digest,
+            **({"step": self.step, "look": self.look} if isinstance(self.recipe, PictureRecipe) else {}),
         }
 
 

@@ -13,8 +13,9 @@ from torch import Tensor, nn
 
 from denoiser.ground.torch_threads import where_torch_can
 from denoiser.networks.dnss import DnSS
+from denoiser.networks.picture_network import PictureDnSS
 from denoiser.networks.stream_network import StreamDnSS
-from denoiser.passes.recipe import Recipe
+from denoiser.passes.recipe import PictureRecipe, Recipe
 from spikecam_env.errors import InputError, OwnCodeError
 
 COMPILED, PARALLEL = "_orig_mod.", "module."
@@ -31,7 +32,7 @@ def check_network(recipe: Any, network: Any) -> None:
     Raises:
         InputError: names the given object, and the one to give.
     """
-    if not isinstance(recipe, Recipe):
+    if not isinstance(recipe, Recipe | PictureRecipe):
         raise InputError(f"recipe is a {type(recipe).__name__}; give a Recipe, for one `recipe_of('best')`")
     if not isinstance(network, nn.Module):
         raise InputError(f"network is {_kind(network)}; give a torch module, `recipe.network()` or of `load_weights`")
@@ -43,7 +44,7 @@ def check_network(recipe: Any, network: Any) -> None:
         own = recipe.network()
     weights = network.state_dict()
     _check_sizes(weights, own.state_dict())
-    if isinstance(network, DnSS | StreamDnSS) and not isinstance(network, type(own)):
+    if isinstance(network, DnSS | StreamDnSS | PictureDnSS) and not isinstance(network, type(own)):
         raise InputError(f"network is a {type(network).__name__}, the recipe's is a {type(own).__name__}; give its own")
     where_torch_can(lambda: _check_values(weights))
 

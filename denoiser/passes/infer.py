@@ -88,7 +88,7 @@ def _as_in_training(
     layout = torch.channels_last
     spikes = torch.from_numpy(np.stack([w.spikes for w in windows])).to(device, number_type)
     planes = torch.from_numpy(np.stack([w.planes for w in windows])).to(device)
-    before = tuple(torch.from_numpy(array).to(device) for array in _stacked(carried)) or None
+    before = tuple(torch.from_numpy(array).to(device) for array in stacked(carried)) or None
     with own_code(f"network {type(network).__name__}"):
         found = network(spikes.contiguous(memory_format=layout), planes.contiguous(memory_format=layout), before)
     return check_output(network, found, (len(windows), max(w.count for w in windows), *windows[0].planes.shape[1:]))
@@ -103,7 +103,7 @@ def _side_by_side(
 ) -> tuple[Tensor, tuple[Tensor, ...]]:
     """The same bits from one array instead of three, and no work for means that no unit's map lets it use."""
     seen = side_by_side(windows, [c[0] if c else None for c in carried], number_type, MULTIPLE)
-    before = _stacked(carried)
+    before = stacked(carried)
     nothing = (len(windows), CARRY, seen.shape[2] // 2, seen.shape[3] // 2)
     hidden = torch.from_numpy(before[1]) if before else torch.zeros(nothing)
     planes = None
@@ -118,7 +118,7 @@ def _side_by_side(
     return rate, (rate[:, -1:].clamp(0.0, 1.0), kept)
 
 
-def _stacked(carried: Sequence[Carried]) -> Carried:
+def stacked(carried: Sequence[Carried]) -> Carried:
     """The carried arrays of all streams, (N, n, h, w); zeros, with which a network begins, where a stream carries
     nothing."""
     some = next((c for c in carried if c), ())

@@ -21,6 +21,7 @@ from denoiser.ground.torch_threads import where_torch_can
 from denoiser.passes import infer
 from denoiser.passes.engine import Engine
 from denoiser.passes.on_host import HostPasses
+from denoiser.passes.window import WindowLayout
 from denoiser.passes.window_torch import StreamWindows, learned, pushed
 from spikecam_env.errors import InputError
 from spikecam_env.streams.packing import as_spikes
@@ -45,7 +46,7 @@ class DevicePasses:
         self, engine: Engine, device: torch.device, shape: tuple[int, int], streams: int = 1, first: int = 0
     ) -> None:
         recipe = engine.recipe
-        if recipe.layout.planes == 1:
+        if not isinstance(recipe.layout, WindowLayout) or recipe.layout.planes == 1:
             raise InputError("a device takes networks of many planes a pass, as mode 'best' is; leave device out")
         self._engine, self.layout, self.shape, self.device = engine, recipe.layout, shape, device
         engine.check_map(shape)

@@ -11,13 +11,13 @@ from __future__ import annotations
 
 import copy
 from collections.abc import Iterable, Iterator
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 
-from denoiser.passes.engine import Engine
+from denoiser.passes.engine import AnyInput, Engine
 from denoiser.passes.infer import Carried
-from denoiser.passes.window import PassWindow, RollingWindow, check_like
+from denoiser.passes.window import check_like
 from spikecam_env.types import Masks, Pictures, Spikes
 
 
@@ -77,13 +77,13 @@ class HostPasses:
         sizes = self._engine.recipe.carries(self.shape)
         self._streams[stream].restore(state, sizes)
 
-    def _over(self, due: list[Iterator[PassWindow]]) -> list[list[tuple[int, Pictures]]]:
+    def _over(self, due: list[Iterator[AnyInput]]) -> list[list[tuple[int, Pictures]]]:
         """Run the windows of all streams, one of each at a time."""
         done: list[list[tuple[int, Pictures]]] = [[] for _ in due]
         while windows := {n: window for n, its in enumerate(due) if (window := next(its, None)) is not None}:
             wanted = {n: window for n, window in windows.items() if self._streams[n].wants(window)}
             carried = [self._streams[n].carried for n in wanted]
-            found = self._engine.run(list(wanted.values()), carried) if wanted else []
+            found = self._engine.run(list(wanted.values()), carried, self.shape) if wanted else []
             results = dict(zip(wanted, found, strict=True))
             for n, window in windows.items():
                 done[n].append(self._streams[n].passed(window, results.get(n)))
@@ -94,7 +94,7 @@ class _Stream:
     """The window of a stream, and the arrays that its last pass left."""
 
     def __init__(self, engine: Engine, shape: tuple[int, int], first: int) -> None:
-        self.window = RollingWindow(engine.recipe.layout, shape, engine.unit)
+        self.window = engine.window(shape)
         self.carried: Carried = ()
         self._stride, self._first = engine.stride, first
         self._skipped = 0  # frames before the first
@@ -104,22 +104,22 @@ class _Stream:
     def covered(self) -> int:
         return self._first + self.window.start
 
-    def windows(self, chunk: Spikes) -> Iterator[PassWindow]:
+    def windows(self, chunk: Spikes) -> Iterator[AnyInput]:
         """(K, H, W) more frames -> windows; each is to go through `passed` before the next is made."""
         skip = min(self._first - self._skipped, len(chunk))
         self._skipped += skip
         return self.window.push(chunk[skip:])
 
-    def wants(self, window: PassWindow) -> bool:
+    def wants(self, window: AnyInput) -> bool:
         """Whether the network is to be run for this window, or its last plane held."""
         return window.start % self._stride == 0 or self._held is None
 
-    def passed(self, window: PassWindow, result: tuple[Pictures, Carried] | None) -> tuple[int, Pictures]:
+    def passed(self, window: AnyInput, result: tuple[Pictures, Carried] | None) -> tuple[int, Pictures]:
         """The first frame of a pass, and its rates.  `result`: of the network, None where it was not run."""
         if result is not None:
             self._held, self.carried = result
         assert self._held is not None
-        self.window.learn(window, self._held)
+        self.window.learn(cast("Any", window), self._held)
         return self._first + window.start, self._held
 
     def state(self) -> dict[str, Any]:

@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass
-from typing import Annotated, Any, Literal
+from dataclasses import asdict, dataclass, field
+from typing import Annotated, Any, ClassVar, Literal, TypeAlias
 
 from pydantic import AfterValidator, Field
 from torch import nn
 
 from denoiser.networks.dnss import DnSS
+from denoiser.networks.picture_network import HIDDEN, PICTURE_CHANNELS, PictureDnSS
 from denoiser.networks.stream_network import CARRY, CHANNELS, MOST_CHANNELS, StreamDnSS
+from denoiser.passes.picture_window import CONDITIONS, DARK, MULTIPLE, PictureLayout
 from denoiser.passes.window import WindowLayout
 from spikecam_env.checked import checked_whole
 from spikecam_env.errors import InputError, shown, unknown_name
@@ -59,6 +61,43 @@ class Recipe:
         return cls(layout, plain.target, plain.decoder, plain.refine, plain.channels)
 
 
+@dataclass(frozen=True)
+class PictureRecipe:
+    """Network and planes of a mode that gives one picture a step."""
+
+    layout: PictureLayout = field(default_factory=PictureLayout)
+    channels: tuple[int, int] = PICTURE_CHANNELS
+    """`picture_network.PictureDnSS`."""
+
+    target: ClassVar[str] = "light"
+    decoder: ClassVar[None] = None
+
+    def network(self) -> PictureDnSS:
+        """The untrained network."""
+        return PictureDnSS(self.layout.layers, self.layout.rates, CONDITIONS, DARK, self.channels)
+
+    def carries(self, shape: tuple[int, int]) -> tuple[tuple[int, int, int], ...]:
+        """Shape of the hidden picture that a pass leaves for the next, for frames of `shape`."""
+        height, width = (n + -n % MULTIPLE for n in shape)
+        return ((HIDDEN, height // 2, width // 2),)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Plain values, for a checkpoint."""
+        return asdict(self)
+
+
+AnyRecipe: TypeAlias = Recipe | PictureRecipe
+
+
+def recipe_from(data: Any, where: str = "recipe") -> AnyRecipe:
+    """The recipe of `to_dict`; InputError for anything else, whose text `where` begins."""
+    layout = data.get("layout") if isinstance(data, dict) else None
+    if isinstance(layout, dict) and "instants" in layout:
+        plain = declared(_DeclaredPictureRecipe, data, where)
+        return PictureRecipe(PictureLayout(**plain.layout.model_dump()), plain.channels)
+    return Recipe.from_dict(data, where)
+
+
 def _none_or_some(memory: float) -> float:
     if 0 < memory < 1:
         raise ValueError("it must be 0 or at least 1")
@@ -89,6 +128,23 @@ class _DeclaredRecipe(Declared):
     channels: Annotated[tuple[_Channels, _Channels, _Channels], Field(strict=False)] = CHANNELS
 
 
+_Age = Annotated[int, Field(ge=-64, le=64)]
+_Few = Field(max_length=16, strict=False)
+
+
+class _DeclaredPictureLayout(Declared):
+    instants: Annotated[tuple[_Age, ...], _Few]
+    counts: Annotated[tuple[Annotated[int, Field(ge=1, le=100)], ...], _Few]
+    half_widths: Annotated[tuple[Annotated[int, Field(ge=1, le=64)], ...], _Few]
+    memories: Annotated[tuple[_Memory, ...], _Few]
+    gain_memory: _Memory
+
+
+class _DeclaredPictureRecipe(Declared):
+    layout: _DeclaredPictureLayout
+    channels: Annotated[tuple[_Channels, _Channels], Field(strict=False)]
+
+
 _PASSES = WindowLayout(
     past=16, planes=16, future=16, half_widths=(4, 12, 22), memories=(64.0, 512.0), gain_memory=1024.0
 )
@@ -97,10 +153,12 @@ RECIPES = {
     "best": Recipe(_PASSES, "light", "accumulate"),
     "fast": Recipe(_PASSES, "light", "accumulate", channels=(32, 64, 12)),
 }
+"""Modes that give the rate in every frame."""
+MODES: dict[str, AnyRecipe] = {**RECIPES, "picture": PictureRecipe()}
 
 
 def recipe_of(mode: str) -> Recipe:
-    """The recipe of a mode: "paper", "best" or "fast"."""
+    """The recipe of a mode that gives every frame: "paper", "best" or "fast"."""
     if not isinstance(mode, str) or mode not in RECIPES:
         raise unknown_name("denoiser mode", mode, RECIPES)
     return RECIPES[mode]

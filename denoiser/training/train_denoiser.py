@@ -182,6 +182,8 @@ def started(recipe: Recipe, start: str, seed: int, patch: int = 64) -> nn.Module
         InputError: the weights are of another kind of network, or of a smaller one.
     """
     found, network, _ = load_weights(start)
+    if not isinstance(found, Recipe):
+        raise InputError(f"start is {start!r}, weights of mode 'picture'; give a file of this mode")
     alike = replace(found, decoder=recipe.decoder, channels=recipe.channels, refine=recipe.refine) == recipe
     larger = all(one >= other for one, other in zip(found.channels, recipe.channels, strict=True))
     if not alike or not larger or found.refine < recipe.refine:  # how rates become spikes is not learnt

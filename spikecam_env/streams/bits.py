@@ -33,8 +33,19 @@ def _lowest(typing_context: Any, word: Any) -> Any:
     return types.uint64(types.uint64), build
 
 
+def _highest(typing_context: Any, word: Any) -> Any:
+    """Position of the highest set bit of a uint64 that is not zero."""
+
+    def build(context: Any, builder: Any, signature: Any, args: Any) -> Any:
+        above = builder.ctlz(args[0], ir.Constant(ir.IntType(1), 1))
+        return builder.sub(ir.Constant(ir.IntType(64), 63), above)
+
+    return types.uint64(types.uint64), build
+
+
 ones: Any = intrinsic(_ones)
 lowest: Any = intrinsic(_lowest)
+highest: Any = intrinsic(_highest)
 
 
 def as_words(packed: NDArray[np.uint8]) -> NDArray[np.uint64]:

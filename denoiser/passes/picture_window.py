@@ -1,0 +1,452 @@
+"""The input of mode `picture`: a few rate planes about one instant, from a history of 128 frames a pixel.
+
+    packed frames -> bits of each pixel (two words) -> planes at a step's end -> network -> picture -> gain
+
+An age counts frames back from the newest, whose age is 0.  A pass comes after every `step` frames and shows the light
+at the age `look`.  Its planes [spikes/frame] are, in this order:
+
+    intervals   1/ISI at the ages look + a, a of `instants`.  An interval that is still open is at least as long as it
+                has lasted, and as the interval before it.
+    counts      spikes / w over w frames about `look`, those nearest to it where the newest frame is nearer than w / 2
+    whole       n / (t_n - t_0) over the whole intervals about look - h .. look + h, h of `half_widths`
+    history     the same over all 128 frames
+    means       running means with `memories`, as in `denoiser.passes.window`
+    last        the last picture
+
+All but the last are divided by the pixel's gain, and all are given as sqrt(rate + DARK): the noise of such a root is
+about the same at any light.  Two planes follow them: 4 (gain - 1), and how much of the gain was
+learned while the light changed,
+
+    c = d / (1 + d),    d <- d kept + min(|change of log(picture + DARK)|, 1)        a step
+
+for where nothing moves, texture is taken for gain.  The gain is g = (spikes + 2) / (sum of pictures + 2), as in
+`denoiser.passes.window`; a picture stands for the frames of its step, but for no more than the history holds.  With a
+calibration map, planes are (plane - dark) / gain, and c is 1.
+
+A frame costs some nanoseconds a pixel, whatever the step: its bits go into the history, and what leaves it goes into
+one number, the age of the last spike before it.  The stream is cut by steps alone, however it is pushed.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from denoiser.ground.strips import share_rows
+from denoiser.passes.pixel_map import PixelMap
+from denoiser.passes.window import WINDOW_PRIOR, check_like
+from spikecam_env.compiled import njit
+from spikecam_env.streams.bits import as_words, highest, lowest, ones, transpose
+from spikecam_env.streams.packing import pack_frames
+from spikecam_env.types import Pictures
+
+HISTORY = 128
+"""Frames that a pixel's two words hold."""
+WORD = 64
+"""Frames that are taken in at a time."""
+OLDEST = 1 << 20
+"""Greatest age of a spike [frames]: exact in float32."""
+DARK = 0.01
+"""Rate that is added under a root or a logarithm [spikes/frame]; chosen here."""
+MULTIPLE = 4
+"""Planes are extended to a multiple of so many rows and columns, by repeating the border."""
+LOOKS = (4, 24)
+"""Ages that a picture may show [frames]."""
+STEPS = (8, 4000)
+"""Frames of a step, from least to most."""
+TYPICAL_STEP, TYPICAL_LOOK = 40, 12
+LONGEST_KNOWN_STEP = 256
+"""Steps beyond it look the same to the network [frames]."""
+YOUTH = 256.0
+"""Time in which a stream is no longer young, to the network [frames]."""
+
+_Q = np.uint64
+
+
+@dataclass(frozen=True)
+class PictureLayout:
+    """Planes of a pass of mode `picture` (see above)."""
+
+    instants: tuple[int, ...] = (-8, 0, 8, 16, 24)
+    """Ages of the intervals, from `look` on [frames]."""
+    counts: tuple[int, ...] = (8, 20, 40, 80)
+    """[frames]"""
+    half_widths: tuple[int, ...] = (8, 20)
+    """[frames]"""
+    memories: tuple[float, ...] = (512.0, 4096.0)
+    """[frames]"""
+    gain_memory: float = 1024.0
+    """[frames]"""
+
+    planes = 1
+    """Pictures of a pass."""
+
+    @property
+    def rates(self) -> int:
+        """Planes that are rates; the last picture is the last of them."""
+        return len(self.instants) + len(self.counts) + len(self.half_widths) + 1 + len(self.memories) + 1
+
+    @property
+    def layers(self) -> int:
+        """Planes in all."""
+        return self.rates + 2
+
+    @property
+    def latency(self) -> int:
+        """Age of a picture that looks as pictures do by default [frames]."""
+        return TYPICAL_LOOK
+
+
+CONDITIONS = 4
+"""Numbers of a pass beside its planes: the step's length, the age of the picture, the stream's youth, whether the unit
+is calibrated."""
+
+
+@dataclass(frozen=True)
+class PictureInput:
+    """One pass, as `PassWindow` is one of other modes: its picture is of frame `start`."""
+
+    start: int
+    planes: Pictures
+    """(H', W', layers), H' and W' extended to a multiple of MULTIPLE."""
+    conditions: NDArray[np.float32]
+    """(CONDITIONS,)."""
+
+    count = 1
+
+
+class PictureWindow:
+    """The history of one stream, and its planes.
+
+    Args:
+        layout: of the planes.
+        shape: (rows, columns).
+        unit: the calibration map.
+        step: frames from a picture to the next, in `STEPS`; may be set anew after a pass.
+        look: age of a picture, in `LOOKS`.
+    """
+
+    def __init__(
+        self,
+        layout: PictureLayout,
+        shape: tuple[int, int],
+        unit: PixelMap | None = None,
+        step: int = TYPICAL_STEP,
+        look: int = TYPICAL_LOOK,
+    ) -> None:
+        self.layout, self.shape, self.unit = layout, shape, unit
+        self.step, self.look = step, look
+        self.seen = 0
+        """Frames so far."""
+        pixels = shape[0] * shape[1]
+        self._bits = np.zeros((2, pixels), np.uint64)  # of ages 0 .. 63 and 64 .. 127
+        self._before = np.zeros(pixels, np.int32)  # age of the last spike before the history; at first that of frame -1
+        self._means = np.zeros((len(layout.memories), pixels), np.float32)
+        self._sums = np.zeros((2, pixels), np.float32)  # of spikes and of pictures, for the gain
+        self._changed = np.zeros(pixels, np.float32)
+        self._last = np.zeros(pixels, np.float32)  # the last picture
+        self._pictures = 0
+        self._in_step = 0  # frames since the last pass
+        self._stood_for = 0  # frames of the last pass
+        self._held = np.empty((0, -(-pixels // 8)), np.uint8)  # packed frames that do not fill a word yet
+
+    @property
+    def start(self) -> int:
+        """Frame of the last picture, or of the first."""
+        return max(self.seen - 1 - self.look, 0)
+
+    def push(self, chunk: NDArray[np.uint8]) -> Iterator[PictureInput]:
+        """(K, H, W) more frames -> the passes that they complete; `learn` is to follow each."""
+        return self.push_packed(pack_frames(chunk))
+
+    def push_packed(self, packed: NDArray[np.uint8]) -> Iterator[PictureInput]:
+        """`push` of (K, ceil(H W / 8)) packed frames."""
+        self._held = np.concatenate([self._held, packed]) if len(self._held) else packed
+        while (due := self._due()) <= len(self._held):
+            self._take(due)
+            if self._in_step == self.step:
+                yield self._input()
+        self._held = self._held.copy()  # not the caller's memory
+
+    def end(self) -> Iterator[PictureInput]:
+        """The stream is over: a pass after the frames that do not fill a step, where there are any."""
+        self._take(len(self._held))
+        if self._in_step:
+            yield self._input()
+
+    def learn(self, window: PictureInput, rates: Pictures) -> None:
+        """Take in the picture (1, H, W) of a pass, for the gain of later ones, and as their last picture."""
+        picture = np.ascontiguousarray(rates, np.float32).reshape(-1)
+        look = self.seen - 1 - window.start
+        frames = min(self._stood_for, HISTORY - look)
+        kept = np.float32((1 - 1 / self.layout.gain_memory) ** frames)
+        of_last = np.float32(frames / (2 * self._stood_for) if self._pictures else 0.0)
+
+        def learned(pixels: slice) -> None:
+            _learn(
+                self._bits[:, pixels], picture[pixels], self._last[pixels], look, frames, of_last, kept,
+                self._sums[:, pixels], self._changed[pixels],
+            )  # fmt: skip
+
+        self._share(learned)
+        if not self._pictures:
+            self._changed[:] = 0.0
+        self._last = picture.copy()
+        self._pictures += 1
+
+    def state(self) -> dict[str, Any]:
+        """A copy of everything on which later passes depend."""
+        arrays = {name: getattr(self, f"_{name}").copy() for name in _ARRAYS}
+        return {name: getattr(self, name) for name in _NUMBERS} | arrays
+
+    def restore(self, state: dict[str, Any]) -> None:
+        """Continue from `state()`; InputError for arrays of another size or type."""
+        for name in _ARRAYS:
+            check_like(state[name], getattr(self, f"_{name}"), name, lengths=name != "held")
+        for name in _ARRAYS:
+            setattr(self, f"_{name}", state[name].copy())
+        for name in _NUMBERS:
+            setattr(self, name, int(state[name]))
+
+    def _due(self) -> int:
+        """Frames until the history takes some in: a word, or what is left of the step."""
+        return min(WORD, self.step - self._in_step)
+
+    def _take(self, frames: int) -> None:
+        """Take the first held frames into the history."""
+        if not frames:
+            return
+        words = as_words(self._held[:frames])
+        shares = np.asarray([1 - (1 - 1 / m) ** frames for m in self.layout.memories], np.float32)
+
+        def advanced(pixels: slice) -> None:
+            _advance(
+                words[:, pixels.start // WORD : -(-pixels.stop // WORD)], self._bits[:, pixels], self._before[pixels],
+                shares, self._means[:, pixels],
+            )  # fmt: skip
+
+        self._share(advanced)
+        self._held = self._held[frames:]
+        self.seen += frames
+        self._in_step += frames
+
+    def _input(self) -> PictureInput:
+        self._stood_for, self._in_step = self._in_step, 0
+        layout = self.layout
+        look = min(self.look, self.seen - 1)
+        height, width = self.shape
+        planes = np.empty((height + -height % MULTIPLE, width + -width % MULTIPLE, layout.layers), np.float32)
+        instants = np.clip(look + np.asarray(layout.instants), 0, HISTORY - 1)
+        counts, widths = np.asarray(layout.counts), np.asarray(layout.half_widths)
+        weights = np.asarray([1 / (1 - (1 - 1 / m) ** self.seen) for m in layout.memories], np.float32)
+        nothing = np.zeros(0, np.float32)
+        gain, dark = (nothing, nothing) if self.unit is None else (self.unit.gain.ravel(), self.unit.dark.ravel())
+
+        def painted(_: int, rows: slice) -> None:
+            for row in range(rows.start, rows.stop):
+                pixels = slice(width * row, width * (row + 1))
+                _paint(
+                    self._bits[:, pixels], self._before[pixels], self.seen, look, instants, counts, widths,
+                    self._means[:, pixels], weights, self._last[pixels], self._sums[:, pixels], self._changed[pixels],
+                    gain[pixels], dark[pixels], planes[row, :width],
+                )  # fmt: skip
+
+        share_rows(painted, 1, height, planes.size)
+        planes[:height, width:] = planes[:height, width - 1 : width]
+        planes[height:] = planes[height - 1 : height]
+        conditions = conditions_of(self._stood_for, look, self.seen, mapped=self.unit is not None)
+        return PictureInput(self.seen - 1 - look, planes, conditions)
+
+    def _share(self, work: Callable[[slice], None]) -> None:
+        """Call work(pixels) for runs of pixels, on as many threads as pay."""
+        pixels = len(self._before)
+        lines = -(-pixels // WORD)
+        share_rows(
+            lambda _, rows: work(slice(WORD * rows.start, min(WORD * rows.stop, pixels))), 1, lines, WORD * pixels
+        )
+
+
+_NUMBERS = ("seen", "_pictures", "_in_step", "_stood_for")
+_ARRAYS = ("bits", "before", "means", "sums", "changed", "last", "held")
+
+
+def conditions_of(step: int, look: int, seen: int, *, mapped: bool) -> NDArray[np.float32]:
+    """(CONDITIONS,) of a pass, each about -1 to 1."""
+    known_step = min(step, LONGEST_KNOWN_STEP)
+    youth = np.exp(-seen / YOUTH)
+    return np.asarray([np.log2(known_step / TYPICAL_STEP) / 2, look / TYPICAL_LOOK - 1, youth, mapped], np.float32)
+
+
+@njit(cache=True, nogil=True, boundscheck=False, error_model="numpy")
+def _advance(
+    words: NDArray[np.uint64],
+    bits: NDArray[np.uint64],
+    before: NDArray[np.int32],
+    shares: NDArray[np.float32],
+    means: NDArray[np.float32],
+) -> None:
+    """Take n <= 64 frames into the history; words (n, pixels / 64) hold the oldest first."""
+    frames, pixels = words.shape[0], before.size
+    square = np.empty(64, np.uint64)
+    for column in range(words.shape[1]):
+        for age in range(64):
+            square[age] = words[frames - 1 - age, column] if age < frames else _Q(0)
+        transpose(square)
+        first = 64 * column
+        for p in range(first, min(first + 64, pixels)):
+            new, recent, old = square[p - first], bits[0, p], bits[1, p]
+            if frames == 64:
+                leaving, bits[1, p], bits[0, p] = old, recent, new
+            else:
+                n, rest = _Q(frames), _Q(64 - frames)
+                leaving = old >> rest
+                bits[1, p] = (old << n) | (recent >> rest)
+                bits[0, p] = (recent << n) | new
+            if leaving:
+                before[p] = 128 + np.int32(lowest(leaving))
+            else:
+                before[p] = min(before[p] + frames, OLDEST)
+            rate = np.float32(ones(new)) / np.float32(frames)
+            for m in range(shares.size):
+                means[m, p] += shares[m] * (rate - means[m, p])
+
+
+@njit(cache=True, nogil=True, boundscheck=False, error_model="numpy")
+def _at_or_before(recent: np.uint64, old: np.uint64, before: int, age: int) -> Any:
+    """Age of the youngest spike that is not younger than `age` (below 128)."""
+    if age < 64:
+        word = recent >> _Q(age)
+        if word:
+            return age + np.int64(lowest(word))
+        return 64 + np.int64(lowest(old)) if old else np.int64(before)
+    word = old >> _Q(age - 64)
+    return age + np.int64(lowest(word)) if word else np.int64(before)
+
+
+@njit(cache=True, nogil=True, boundscheck=False, error_model="numpy")
+def _below(age: int) -> Any:
+    """The bits 0 .. age of a word, without that of `age` (0 to 64)."""
+    if age <= 0:
+        return _Q(0)
+    return _Q(0xFFFFFFFFFFFFFFFF) >> _Q(64 - min(age, 64))
+
+
+@njit(cache=True, nogil=True, boundscheck=False, error_model="numpy")
+def _after(recent: np.uint64, old: np.uint64, age: int) -> Any:
+    """Age of the oldest spike that is younger than `age` (128 or less); -1: there is none."""
+    word = old & _below(age - 64)
+    if word:
+        return 64 + np.int64(highest(word))
+    word = recent & _below(age)
+    return np.int64(highest(word)) if word else -1
+
+
+@njit(cache=True, nogil=True, boundscheck=False, error_model="numpy")
+def _counted(recent: np.uint64, old: np.uint64, first: int, stop: int) -> Any:
+    """Spikes of ages first .. stop, without `stop` (128 or less)."""
+    young = ones(recent & _below(stop) & ~_below(first))
+    return np.int64(young + ones(old & _below(stop - 64) & ~_below(first - 64)))
+
+
+@njit(cache=True, nogil=True, boundscheck=False, error_model="numpy")
+def _open(recent: np.uint64, old: np.uint64, before: int, spike: int) -> Any:
+    """Frames of the interval from the newest spike, of age `spike`, to now, at least."""
+    lasted = spike + 1
+    if spike < 127 and spike < before:
+        return max(lasted, _at_or_before(recent, old, before, spike + 1) - spike)
+    return lasted
+
+
+@njit(cache=True, nogil=True, boundscheck=False, error_model="numpy")
+def _paint(
+    bits: NDArray[np.uint64],
+    before: NDArray[np.int32],
+    seen: int,
+    look: int,
+    instants: NDArray[np.int64],
+    counts: NDArray[np.int64],
+    widths: NDArray[np.int64],
+    means: NDArray[np.float32],
+    weights: NDArray[np.float32],
+    last: NDArray[np.float32],
+    sums: NDArray[np.float32],
+    changed: NDArray[np.float32],
+    mapped_gain: NDArray[np.float32],
+    mapped_dark: NDArray[np.float32],
+    planes: NDArray[np.float32],
+) -> None:
+    """The planes (pixels, layers) of a row of pixels."""
+    one, root_dark = np.float32(1.0), np.float32(DARK)
+    rates = instants.size + counts.size + widths.size + 1 + weights.size
+    spikes, frames = np.empty(rates, np.float32), np.empty(rates, np.float32)
+    for p in range(before.size):
+        recent, old, oldest, out = bits[0, p], bits[1, p], np.int64(before[p]), planes[p]
+        at = 0
+        for i in range(instants.size):
+            age = min(instants[i], oldest)
+            spike, following = _at_or_before(recent, old, oldest, age), _after(recent, old, age)
+            length = spike - following if following >= 0 else _open(recent, old, oldest, spike)
+            spikes[at + i], frames[at + i] = one, np.float32(length)
+        at += instants.size
+        for i in range(counts.size):
+            first = max(look - counts[i] // 2, 0)
+            stop = min(first + counts[i], max(seen, first + 1))
+            spikes[at + i] = np.float32(_counted(recent, old, first, stop))
+            frames[at + i] = np.float32(stop - first)
+        at += counts.size
+        newest = _at_or_before(recent, old, oldest, 0)
+        for i in range(widths.size + 1):
+            begin, end = oldest, newest
+            if i < widths.size:
+                begin = _at_or_before(recent, old, oldest, min(look + widths[i], oldest))
+                inner = _after(recent, old, max(look - widths[i], 0) + 1)
+                end = inner if inner >= 0 else newest
+            n, length = 1, np.int64(0)
+            if begin > end:
+                n, length = _counted(recent, old, end, min(begin, 128)), begin - end
+            else:
+                length = _open(recent, old, oldest, newest)
+            spikes[at + i], frames[at + i] = np.float32(n), np.float32(length)
+        at += widths.size + 1
+        for i in range(weights.size):
+            spikes[at + i], frames[at + i] = means[i, p] * weights[i], one
+        if mapped_gain.size:
+            gain, dark, known = mapped_gain[p], mapped_dark[p], one
+        else:
+            gain = (sums[0, p] + np.float32(WINDOW_PRIOR)) / (sums[1, p] + np.float32(WINDOW_PRIOR))
+            gain, dark = min(max(gain, np.float32(0.5)), np.float32(2.0)), np.float32(0.0)
+            known = changed[p] / (one + changed[p])
+        share = one / gain
+        for i in range(rates):
+            out[i] = np.sqrt(max(spikes[i] / frames[i] - dark, np.float32(0.0)) * share + root_dark)
+        at = rates
+        out[at] = np.sqrt(last[p] + root_dark)
+        out[at + 1] = np.float32(4.0) * (gain - one)
+        out[at + 2] = known
+
+
+@njit(cache=True, nogil=True, boundscheck=False, error_model="numpy")
+def _learn(
+    bits: NDArray[np.uint64],
+    picture: NDArray[np.float32],
+    last: NDArray[np.float32],
+    look: int,
+    frames: int,
+    of_last: np.float32,
+    kept: np.float32,
+    sums: NDArray[np.float32],
+    changed: NDArray[np.float32],
+) -> None:
+    """The sums for the gain, of the frames that the picture stands for, and how much the light has changed."""
+    one = np.float32(1.0)
+    for p in range(picture.size):
+        spikes = np.float32(_counted(bits[0, p], bits[1, p], look, look + frames))
+        mean = (one - of_last) * picture[p] + of_last * last[p]
+        sums[0, p] = kept * sums[0, p] + spikes
+        sums[1, p] = kept * sums[1, p] + np.float32(frames) * mean
+        change = abs(np.log((picture[p] + np.float32(DARK)) / (last[p] + np.float32(DARK))))
+        changed[p] = kept * changed[p] + min(change, one)
