@@ -107,6 +107,8 @@ def read_film(film: str | PathLike[str] | NDArray[Any], how: FilmOptions) -> Fil
         InputError: it is no film, or has fewer than two pictures or pictures of several sizes.  Time stamps are missing
             or do not rise.  The transfer is unknown, or a file does not state it for values of more than 8 bits.
     """
+    if not isinstance(film, np.ndarray) and Path(film).suffix.lower() == ".npy":
+        film = _from_disk(Path(film))
     where = "the film" if isinstance(film, np.ndarray) else str(film)
     light: list[Pictures] = []
     stamps: list[Any] = []
@@ -188,8 +190,6 @@ def _opened(film: str | PathLike[str] | NDArray[Any], how: FilmOptions) -> Itera
         files, times = pictures_timed(path)
         shown = ((read_picture(file), float(time)) for file, time in zip(files, times, strict=True))
         yield _Source(shown, count=len(files), transfer="srgb")
-    elif path.suffix.lower() == ".npy":
-        yield _array(_from_disk(path), how)
     elif not path.is_file():
         raise InputError(f"there is no film {path}")
     else:

@@ -35,7 +35,7 @@ STATED_TRANSFERS = {
     18: "HLG",
 }
 """Transfer by its number in H.273; PQ and HLG are refused."""
-UNSTATED = (0, 2)
+UNSTATED = (2, 0)
 """Numbers that say nothing; H.273 has 2, and some files 0."""
 MATRICES = {
     1: (0.2126, 0.0722),
@@ -88,18 +88,14 @@ def stored(frame: VideoFrame, where: str, turned: bool = True) -> StoredPicture:
         )
     is_float = re.fullmatch(FLOATS, frame.format.name) is not None
     bits = 32 if is_float else max(part.bits for part in frame.format.components)
+    transfer, primaries = stated_transfer(int(frame.color_trc), bits), int(frame.color_primaries)
     values = _floats(frame) if is_float else _fractions(frame, bits, where)
     if values.shape[2:] == (4,):
         if values[..., 3].min() < 1:
             raise InputError(f"{where}: it has transparent pixels; lay it over a background first")
         values = values[..., :3]
     turns = round(frame.rotation / 90) if turned else 0
-    return StoredPicture(
-        np.ascontiguousarray(np.rot90(values, turns)),
-        stated_transfer(int(frame.color_trc), bits),
-        int(frame.color_primaries),
-        bits,
-    )
+    return StoredPicture(np.ascontiguousarray(np.rot90(values, turns)), transfer, primaries, bits)
 
 
 def stated_transfer(number: int, bits: int) -> str | None:
@@ -111,8 +107,13 @@ def stated_transfer(number: int, bits: int) -> str | None:
 
 def _floats(frame: VideoFrame) -> Pictures:
     """(h, w) or (h, w, 3 or 4) as they are.  Planes of half floats are read here: FFmpeg would cut them off at 1."""
-    if not re.match("(gray|gbra?p)f16", frame.format.name):
-        return frame.to_ndarray().astype(np.float32)
+    name = frame.format.name
+    if any(
+        plane.line_size < 0 for plane in frame.planes
+    ):  # from the bottom up; other bytes are a copy from the top down
+        name = f"{name[:-2]}{'le' if frame.format.is_big_endian else 'be'}"
+    if not re.match("(gray|gbra?p)f16", name):
+        return frame.to_ndarray(format=name).astype(np.float32)
     kind = ">f2" if frame.format.is_big_endian else "<f2"
     planes = [
         np.frombuffer(bytes(p), kind).reshape(p.height, -1)[:, : p.width].astype(np.float32) for p in frame.planes
@@ -127,18 +128,22 @@ def _fractions(frame: VideoFrame, bits: int, where: str) -> Pictures:
     layout = next((layouts[has_alpha] for known, *layouts in LAYOUTS if re.fullmatch(known, form.name)), None)
     if layout is None:
         raise InputError(f"{where}: its pixels are {form.name}; convert it to RGB or YUV first")
+    matrix = _matrix(frame, where) if layout.startswith("yuv") else None
     limited = _is_limited(frame, layout)
     same = LIMITED if limited else FULL
+    frame.color_trc = frame.color_primaries = UNSTATED[
+        0
+    ]  # PyAV 17 lays out no frame with tags that FFmpeg does not know
     codes: NDArray[Any] = frame.to_ndarray(format=layout, src_color_range=same, dst_color_range=same)
     spare = 8 * codes.itemsize - bits
     full, s = 2**bits - 1, 2 ** (bits - 8)
     dark, span = (16 * s, 219 * s) if limited else (0, full)
     levels = np.float32(codes >> spare)
-    if not layout.startswith("yuv"):
+    if matrix is None:
         return np.asarray(((levels - dark) / span).clip(0, 1))
     luma = ((levels[..., :1] - dark) / span).clip(0, 1)
     colour = (np.float32(codes[..., 1:3]) / 2**spare - 128 * s) / (224 * s if limited else full)
-    rgb = (luma + colour @ _matrix(frame, where)).clip(0, 1)
+    rgb = (luma + colour @ matrix).clip(0, 1)
     return np.concatenate([rgb, levels[..., 3:] / full], -1)
 
 

@@ -385,6 +385,7 @@ def test_an_exr_is_linear_light_above_one(kind: str, tmp_path: Path) -> None:
     [
         ("f.mp4", "libx264", "yuv420p", yuv420(greys([80])[0], 128), "interlaced"),
         ("f.mov", "png", "rgba", np.full((32, 32, 4), 254, np.uint8), "transparent"),
+        ("f.mkv", "ffv1", "yuv420p", yuv420(greys([80])[0], 128), "coded by matrix 8 of H.273; convert it to BT.709"),
         ("f.nut", "rawvideo", "rgb565le", av.VideoFrame(32, 32, "rgb565le"), "pixels are rgb565le; convert it to RGB"),
         ("f.nut", "rawvideo", "monow", av.VideoFrame(32, 32, "monow"), "pixels are monow; convert it to RGB"),
     ],
@@ -393,7 +394,7 @@ def test_rare_encodings_are_refused_by_name(
     name: str, codec: str, stored_as: str, picture: Any, message: str, tmp_path: Path
 ) -> None:
     options = {"x264-params": "tff=1"} if message == "interlaced" else None
-    path = write_film(tmp_path / name, [picture] * 2, stored_as, codec, options=options)
+    path = write_film(tmp_path / name, [picture] * 2, stored_as, codec, options=options, colorspace=8)
     with pytest.raises(InputError, match=message):
         VideoScene(path, transfer="srgb")
 
