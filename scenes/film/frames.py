@@ -35,7 +35,7 @@ STATED_TRANSFERS = {
     18: "HLG",
 }
 """Transfer by its number in H.273; PQ and HLG are refused."""
-UNSTATED = (2, 0)
+UNSTATED = (0, 2)
 """Numbers that say nothing; H.273 has 2, and some files 0."""
 MATRICES = {
     1: (0.2126, 0.0722),
@@ -107,18 +107,16 @@ def stated_transfer(number: int, bits: int) -> str | None:
 
 def _floats(frame: VideoFrame) -> Pictures:
     """(h, w) or (h, w, 3 or 4) as they are.  Planes of half floats are read here: FFmpeg would cut them off at 1."""
-    name = frame.format.name
-    if any(
-        plane.line_size < 0 for plane in frame.planes
-    ):  # from the bottom up; other bytes are a copy from the top down
-        name = f"{name[:-2]}{'le' if frame.format.is_big_endian else 'be'}"
-    if not re.match("(gray|gbra?p)f16", name):
-        return frame.to_ndarray(format=name).astype(np.float32)
-    kind = ">f2" if frame.format.is_big_endian else "<f2"
-    planes = [
-        np.frombuffer(bytes(p), kind).reshape(p.height, -1)[:, : p.width].astype(np.float32) for p in frame.planes
-    ]
-    return planes[0] if len(planes) == 1 else np.stack([planes[2], *planes[:2], *planes[3:]], -1)
+    name, planes = frame.format.name, frame.planes
+    order, other = ("be", "le") if frame.format.is_big_endian else ("le", "be")
+    if re.match("(gray|gbra?p)f16", name):
+        kind = ">f2" if order == "be" else "<f2"
+        halves = [np.frombuffer(bytes(p), kind).reshape(p.height, -1)[:, : p.width] for p in planes]
+        shown = halves[0] if len(halves) == 1 else np.stack([halves[2], *halves[:2], *halves[3:]], -1)
+        return shown.astype(np.float32)
+    if any(plane.line_size < 0 for plane in planes):  # PyAV 17 misreads rows from the bottom up; a copy has them down
+        name = name.removesuffix(order) + other
+    return frame.to_ndarray(format=name).astype(np.float32)
 
 
 def _fractions(frame: VideoFrame, bits: int, where: str) -> Pictures:
@@ -131,9 +129,7 @@ def _fractions(frame: VideoFrame, bits: int, where: str) -> Pictures:
     matrix = _matrix(frame, where) if layout.startswith("yuv") else None
     limited = _is_limited(frame, layout)
     same = LIMITED if limited else FULL
-    frame.color_trc = frame.color_primaries = UNSTATED[
-        0
-    ]  # PyAV 17 lays out no frame with tags that FFmpeg does not know
+    frame.color_trc = frame.color_primaries = 2  # PyAV 17 lays out no frame with tags that FFmpeg does not know
     codes: NDArray[Any] = frame.to_ndarray(format=layout, src_color_range=same, dst_color_range=same)
     spare = 8 * codes.itemsize - bits
     full, s = 2**bits - 1, 2 ** (bits - 8)

@@ -275,6 +275,16 @@ def test_colours_follow_the_stated_matrix(matrix: int, kr: float, kb: float, tmp
         )
 
 
+def test_colour_of_half_resolution_lies_at_the_left_of_two_pixels_as_h264_has_it(tmp_path: Path) -> None:
+    """Red rises between the columns 14 and 16, by half of it at 15."""
+    cb, cr = np.full((16, 16), 128, np.uint8), np.full((16, 16), 128, np.uint8)
+    cr[:, 8:] = 200
+    picture = np.concatenate([greys([110])[0], cb.reshape(8, 32), cr.reshape(8, 32)])
+    path = write_film(tmp_path / "f.mp4", [picture] * 2, "yuv420p", "libx264", options={"qp": "0"})
+    red = quiet(path, transfer="linear", channel="red", **FULL).truth(0).radiance[16]
+    np.testing.assert_allclose((red[13:18] - red[0]) / (red[-1] - red[0]), [0, 0, 0.5, 1, 1], atol=0.01)
+
+
 # -- folders and lists -----------------------------------------------------------------------------------------
 
 
