@@ -1,7 +1,7 @@
 """A film as it was taken: linear light of every picture, and the time of each.
 
-A film is a video file, a folder of pictures, or a CSV file that lists pictures with their times (`name,time_s`).
-Times are the file's own time stamps, or those that the user gives; a transfer likewise.
+A film is a video file, a folder of pictures, a CSV file that lists pictures with their times (`name,time_s`), or an
+array.  Times are the file's own time stamps, or those that the user gives; a transfer likewise.
 """
 
 from __future__ import annotations
@@ -23,13 +23,13 @@ from tqdm import tqdm
 
 from scenes.film.frames import ALONE, StoredPicture, stored
 from scenes.film.pictures import check_size, pictures_in, pictures_timed, read_picture
-from scenes.film.transfer import grey, light_of
+from scenes.film.transfer import BT709, grey, light_of
 from spikecam_env.errors import InputError
 from spikecam_env.types import Floats, Pictures
 from spikecam_env.untrusted import existing_file
 
 UNSTATED_TRANSFER = "gamma2.2"
-"""Of a video file of 8 bits that states none: that of screens."""
+"""Of a video file of 8 bits that states none, and of arrays: that of screens."""
 MOST_BYTES = 1 << 33
 """Of a film's light in memory: 20 000 pictures of 250 x 400."""
 NOT_VIDEO = ("tty", "hls", "concat", "dash")
@@ -98,21 +98,27 @@ class _Source:
     """For how long the last picture is seen."""
 
 
-def read_film(path: str | PathLike[str], how: FilmOptions) -> Film:
-    """The film in a file or folder.
+def read_film(film: str | PathLike[str] | NDArray[Any], how: FilmOptions) -> Film:
+    """The film in a file or folder, or an array (T, h, w) or (T, h, w, 3: red, green, blue).
 
     Warns where a file holds fewer pictures than it states, and where it states no transfer.
 
     Raises:
-        InputError: the file is no film, or has fewer than two pictures or pictures of several sizes.  Time stamps are
-            missing or do not rise.  The transfer is unknown, or not stated for values of more than 8 bits.
+        InputError: it is no film, or has fewer than two pictures or pictures of several sizes.  Time stamps are missing
+            or do not rise.  The transfer is unknown, or a file does not state it for values of more than 8 bits.
     """
-    where = str(path)
+    if not isinstance(film, np.ndarray) and Path(film).suffix.lower() == ".npy":
+        film = _from_disk(Path(film))
+    where = "the film" if isinstance(film, np.ndarray) else str(film)
     light: list[Pictures] = []
     stamps: list[Any] = []
     transfer, bits = "", 8
     kind: tuple[Any, ...] = ()
-    with _opened(Path(path), how) as source, tqdm(desc=f"read {Path(path).name}", unit="picture", leave=False) as bar:
+    _check_times(how.times_s, where)
+    with (
+        _opened(film, how) as source,
+        tqdm(desc=f"read {Path(where).name}", unit="picture", leave=False, disable=isinstance(film, np.ndarray)) as bar,
+    ):
         ended = True
         for picture, stamp in source.pictures:
             if not light:
@@ -146,20 +152,6 @@ def read_film(path: str | PathLike[str], how: FilmOptions) -> Film:
     return Film(light, time_s, rate, last_s, transfer, bits)
 
 
-def read_array(path: str | PathLike[str]) -> NDArray[Any]:
-    """The array of an .npy file, read from disk as it is used.
-
-    Raises:
-        InputError: the file is not of this kind, or is damaged.
-    """
-    try:
-        return np.load(existing_file(Path(path)), mmap_mode="r", allow_pickle=False)  # type: ignore[no-any-return]
-    except InputError:
-        raise
-    except Exception as error:  # damaged headers fail in many ways
-        raise InputError(f"{path} is not an .npy file of plain numbers ({error})") from error
-
-
 def fitted(picture: Pictures, shape: tuple[int, int] | None) -> Pictures:
     """The middle of the picture that has the shape's proportions, at its size."""
     if shape is None or picture.shape == tuple(shape):
@@ -177,7 +169,11 @@ def fitted(picture: Pictures, shape: tuple[int, int] | None) -> Pictures:
 
 
 @contextmanager
-def _opened(path: Path, how: FilmOptions) -> Iterator[_Source]:
+def _opened(film: str | PathLike[str] | NDArray[Any], how: FilmOptions) -> Iterator[_Source]:
+    if isinstance(film, np.ndarray):
+        yield _array(film, how)
+        return
+    path = Path(film)
     try:
         is_folder = path.is_dir()
     except (OSError, ValueError) as error:  # a name too long, or with a zero in it
@@ -199,6 +195,30 @@ def _opened(path: Path, how: FilmOptions) -> Iterator[_Source]:
     else:
         with _video(path) as source:
             yield source
+
+
+def _from_disk(path: Path) -> NDArray[Any]:
+    """The array of an .npy file, read from disk as it is used."""
+    try:
+        return np.load(existing_file(path), mmap_mode="r", allow_pickle=False)  # type: ignore[no-any-return]
+    except InputError:
+        raise
+    except Exception as error:  # damaged headers fail in many ways
+        raise InputError(f"{path} is not an .npy file of plain numbers ({error})") from error
+
+
+def _array(film: NDArray[Any], how: FilmOptions) -> _Source:
+    if isinstance(film, np.ma.MaskedArray):
+        raise InputError("the film is a masked array; fill it first, every pixel has light")
+    if film.ndim not in (3, 4) or len(film) < 2 or film.size == 0 or (film.ndim == 4 and film.shape[3] != 3):
+        raise InputError(f"the film has shape {film.shape}; it must be (T, h, w) or (T, h, w, 3) with T of 2 or more")
+    if film.dtype.kind not in "uf":
+        raise InputError(f"the film's values are {film.dtype}; they must be uint8, uint16, or floats in [0, 1]")
+    if how.film_rate_hz is None and how.times_s is None:
+        raise InputError("film_rate_hz is None; say how many pictures a second were taken, or give times_s")
+    bits, full = (32, 1) if film.dtype.kind == "f" else (8 * film.dtype.itemsize, 256**film.dtype.itemsize - 1)
+    values = (picture.astype(np.float32) / np.float32(full) for picture in film)
+    return _Source((StoredPicture(picture, UNSTATED_TRANSFER, BT709, bits), None) for picture in values)
 
 
 @contextmanager
@@ -275,20 +295,16 @@ def _transfer(picture: StoredPicture, how: FilmOptions, source: _Source, where: 
     """By which the film is decoded: the user's word, else the file's."""
     stated = how.transfer or picture.transfer
     if stated is not None:
-        if stated.startswith("number"):
-            raise InputError(
-                f"{where}: its transfer is {stated}, which is not read; say which one comes nearest (transfer)"
-            )
         return stated
     if picture.bits > 8 or source.transfer is None:
         raise InputError(
             f"{where}: its values have {picture.bits} bits and it does not state their transfer; say which it is: "
-            "transfer srgb, bt709, gamma2.2, linear, pq or hlg"
+            "transfer srgb, bt709, gamma2.2 or linear"
         )
     if source.transfer == UNSTATED_TRANSFER:
         warnings.warn(
             f"{where} does not state its transfer; {source.transfer} is taken, as of screens (transfer says another)",
-            stacklevel=5,
+            stacklevel=4,
         )
     return source.transfer
 
@@ -316,7 +332,12 @@ def _times(stamps: list[Any], source: _Source, how: FilmOptions, where: str) -> 
     if how.film_rate_hz is not None:
         return np.arange(len(stamps)) / how.film_rate_hz, how.film_rate_hz
     if how.times_s is not None:
-        return given_times(how.times_s, len(stamps), how, where), None
+        cut = how.most is not None or how.seconds is not None
+        if len(how.times_s) < len(stamps) or (len(how.times_s) > len(stamps) and not cut):
+            raise InputError(
+                f"{where}: times_s has shape {how.times_s.shape} for {len(stamps)} pictures; give one for each"
+            )
+        return how.times_s[: len(stamps)] - how.times_s[0], None
     remedy = "; say film_rate_hz, or give the time of each picture"
     if any(stamp is None for stamp in stamps):
         raise InputError(f"{where}: picture {stamps.index(None) + 1} has no time stamp{remedy}")
@@ -339,37 +360,24 @@ def _is_tick(stamp: Any, time: Any, tick_s: Fraction) -> bool:
     return bool(stamp == time or abs(stamp - time) < tick_s)
 
 
-def given_times(times_s: Floats, pictures: int, how: FilmOptions, where: str) -> Floats:
-    """The user's times of so many pictures, from the first [s].
-
-    Raises:
-        InputError: a picture has no time, or times are not finite and rising.
-    """
-    times = np.asarray(times_s, np.float64)
-    cut = how.most is not None or how.seconds is not None
-    if times.ndim != 1 or (len(times) < pictures if cut else len(times) != pictures):
-        raise InputError(f"{where}: times_s has shape {times.shape} for {pictures} pictures; give one for each")
-    if not np.isfinite(times).all() or (np.diff(times) <= 0).any():
-        raise InputError(f"{where}: times_s must be finite, and each after the one before")
-    return np.asarray(times[:pictures] - times[0])
+def _check_times(times_s: Floats | None, where: str) -> None:
+    """Refuse the user's times where they are not (T,), finite and rising."""
+    if times_s is not None and (times_s.ndim != 1 or not np.isfinite(times_s).all() or (np.diff(times_s) <= 0).any()):
+        raise InputError(f"{where}: times_s must be finite, and each after the one before; one for each picture")
 
 
 def _warn_if_cut(pictures: int, end_s: float, source: _Source, how: FilmOptions, where: str) -> None:
     """Warn where the file has fewer pictures, or ends earlier, than it states."""
-    if source.count is not None and pictures < source.count:
-        warnings.warn(
-            f"{where} is cut off or damaged: it holds {pictures} of the {source.count} pictures that it states"
-            f"{source.trouble}; the rest is missing from the light",
-            stacklevel=4,
-        )
-    elif source.duration_s is not None and how.film_rate_hz is None and how.times_s is None:
+    stated = source.count or pictures
+    if stated <= pictures and source.duration_s is not None and how.film_rate_hz is None and how.times_s is None:
         read_s = end_s * how.slow
         if read_s < source.duration_s - 2 * read_s / pictures:
             stated = round(pictures * source.duration_s / read_s)
-            warnings.warn(
-                f"{where} is cut off or damaged: its {pictures} pictures last {read_s:.4g} s of the "
-                f"{source.duration_s:.4g} s that it states, some {stated} pictures{source.trouble}",
-                stacklevel=4,
-            )
+    if pictures < stated:
+        warnings.warn(
+            f"{where} is cut off or damaged: it holds {pictures} of the {stated} pictures that it states"
+            f"{source.trouble}; the rest is missing from the light",
+            stacklevel=4,
+        )
     elif source.trouble:
         warnings.warn(f"{where} is damaged: it holds {pictures} pictures{source.trouble}", stacklevel=4)

@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 from PIL import Image, UnidentifiedImageError
 
-from scenes.film.frames import ALONE, StoredPicture, stated_primaries, stated_transfer, stored
+from scenes.film.frames import ALONE, StoredPicture, stated_transfer, stored
 from spikecam_env.errors import InputError
 from spikecam_env.types import Floats, Pictures
 from spikecam_env.untrusted import existing_file, read_table
@@ -184,19 +184,19 @@ def _deep(image: Any) -> bool:
     return "16" in str(raw) or (image.format == "PPM" and int(more[0]) > 255)
 
 
-def _stated(image: Image.Image, source: Path) -> tuple[str | None, str]:
-    """Transfer and primaries that a PNG states (cICP, sRGB, gAMA); (None, "bt709") where it does not."""
+def _stated(image: Image.Image, source: Path) -> tuple[str | None, int]:
+    """Transfer and primaries that a PNG states (cICP, sRGB, gAMA); (None, 1) where it does not."""
     if image.format != "PNG":
-        return None, "bt709"
+        return None, 1
     with source.open("rb") as file:
         head = file.read(1 << 16)
     place = head.find(b"cICP")
     if 0 < place < head.find(b"IDAT"):
-        return stated_transfer(head[place + 5], 8), stated_primaries(head[place + 4])
+        return stated_transfer(head[place + 5], 8), head[place + 4]
     gamma = image.info.get("gamma")
     if "srgb" in image.info or not gamma or abs(1 / gamma / SRGB_GAMMA - 1) < 0.02:
-        return ("srgb" if "srgb" in image.info or gamma else None), "bt709"
-    return f"gamma{1 / gamma:.4f}", "bt709"
+        return ("srgb" if "srgb" in image.info or gamma else None), 1
+    return f"gamma{1 / gamma:.4f}", 1
 
 
 def _upright(values: Pictures, orientation: int) -> Pictures:

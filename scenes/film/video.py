@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from copy import copy
 from os import PathLike
-from pathlib import Path
 from typing import Literal
 
 import cv2
@@ -12,8 +11,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from scenes.exposure import checked_interval
-from scenes.film.film_files import Film, FilmOptions, fitted, given_times, read_array, read_film
-from scenes.film.transfer import CHANNELS, curve, grey, light_of
+from scenes.film.film_files import FilmOptions, read_film
+from scenes.film.transfer import CHANNELS, curve
 from scenes.keys import LONGEST_INTERVAL, check_frames, interval_for, paint_keys
 from scenes.protocol import Gaze, Truth
 from spikecam_env.errors import InputError, unknown_name
@@ -43,7 +42,7 @@ class VideoScene:
         most_pictures: that are read, from the first.
         frame_rate_hz: of the sensor.
         transfer: from values to linear light, as `transfer.py` names it: "srgb", "bt709", "gamma2.2", "linear",
-            "pq", "hlg"; default: that of the file, "gamma2.2" for arrays.
+            default: that of the file, "gamma2.2" for arrays.
         channel: "luminance", "red", "green" or "blue".
         interpolation: of light in time between two pictures: "linear", or "hold": the former until the next, within a
             frame.
@@ -90,7 +89,7 @@ class VideoScene:
         code = _transfer(transfer, gamma)
         how = FilmOptions(shape, code, channel, film_rate_hz, times, slow, most_pictures, seconds)
         with np.errstate(all="ignore"):  # a film too long or too short for any number is refused below
-            taken = _film(film, how)
+            taken = read_film(film if isinstance(film, (str, PathLike)) else np.asanyarray(film), how)
             end_s = [taken.time_s[-1] + taken.last_s] if interpolation == "hold" else []
             self._knots = np.append(taken.time_s, end_s) * float(frame_rate_hz)
         if not SHORTEST <= self.frames <= LONGEST:
@@ -266,12 +265,6 @@ def _check_choices(
         raise unknown_name("channel", channel, CHANNELS)
 
 
-def _film(film: str | PathLike[str] | NDArray[np.generic], how: FilmOptions) -> Film:
-    if not isinstance(film, (str, PathLike)):
-        return _from_array(film, how)
-    return _from_array(read_array(film), how) if Path(film).suffix.lower() == ".npy" else read_film(film, how)
-
-
 def _transfer(transfer: str | None, gamma: float | None) -> str | None:
     """The name of the transfer, known, from one of the two options at most."""
     if gamma is not None:
@@ -281,33 +274,3 @@ def _transfer(transfer: str | None, gamma: float | None) -> str | None:
     if transfer is not None:
         curve(transfer)
     return transfer
-
-
-def _from_array(film: NDArray[np.generic], how: FilmOptions) -> Film:
-    if isinstance(film, np.ma.MaskedArray):
-        raise InputError("the film is a masked array; fill it first, every pixel has light")
-    film = np.asarray(film)
-    if film.ndim not in (3, 4) or len(film) < 2 or film.size == 0 or (film.ndim == 4 and film.shape[3] != 3):
-        raise InputError(f"the film has shape {film.shape}; it must be (T, h, w) or (T, h, w, 3) with T of 2 or more")
-    if film.dtype.kind not in "uf":
-        raise InputError(f"the film's values are {film.dtype}; they must be uint8, uint16, or floats in [0, 1]")
-    if how.film_rate_hz is None and how.times_s is None:
-        raise InputError("film_rate_hz is None; say how many pictures a second were taken, or give times_s")
-    count = min(len(film), how.most or len(film))
-    if how.times_s is not None:
-        rate = None
-        time_s = given_times(how.times_s, count, how, "the film")
-    else:
-        rate = how.film_rate_hz
-        time_s = np.arange(count) / np.float64(rate)
-    if how.seconds is not None:
-        count = min(count, int(np.searchsorted(time_s, how.seconds)) + 1)
-        time_s = time_s[:count]
-    transfer = how.transfer or "gamma2.2"
-    full = np.float32(256**film.dtype.itemsize - 1) if film.dtype.kind == "u" else np.float32(1)
-    light = [
-        fitted(grey(light_of(picture.astype(np.float32) / full, transfer, "the film"), how.channel), how.shape)
-        for picture in film[:count]
-    ]
-    bits = 32 if film.dtype.kind == "f" else 8 * film.dtype.itemsize
-    return Film(light, time_s, rate, float(time_s[-1] - time_s[-2]), transfer, bits)

@@ -44,8 +44,7 @@ class FilmToSpikes:
     slow: Positive = 1.0
     """Factor of slow motion: the film's time stamps are divided by it."""
     transfer: str | None = None
-    """From its values to linear light: srgb, bt709, gamma2.2 (or another power), linear, pq, hlg; default: as the
-    file states."""
+    """From its values to linear light: srgb, bt709, gamma2.2 (or another power), linear; default: the file's."""
     channel: Literal["luminance", "red", "green", "blue"] = "luminance"
     """Colour to take as light: luminance, or one channel."""
     interpolation: Literal["linear", "hold"] = "linear"

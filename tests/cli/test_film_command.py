@@ -49,10 +49,11 @@ def test_a_video_becomes_spikes_of_the_asked_interval(suffix: str, tmp_path: Pat
 def test_all_kinds_of_file_hold_the_same_spikes(tmp_path: Path) -> None:
     folder = folder_of(tmp_path / "p", [60, 200, 60])
     for name in ("a.h5", "a.dat", "a.npz"):
-        assert spikecam("film", folder, "--film-rate", 800, "--out", tmp_path / name, "--seed", 3, *SMALL) == 0
-    same = read_recording(tmp_path / "a.h5").spikes
+        options = ("--out", tmp_path / name, "--seed", 3, "--frame-rate", 20_000, *SMALL)
+        assert spikecam("film", folder, "--film-rate", 800, *options) == 0
+    same, dat = read_recording(tmp_path / "a.h5").spikes, read_recording(tmp_path / "a.dat")
     assert np.array_equal(same, read_recording(tmp_path / "a.npz").spikes)
-    assert np.array_equal(same, read_recording(tmp_path / "a.dat", height=16, width=24).spikes)
+    assert np.array_equal(same, dat.spikes) and dat.frame_rate_hz == 20_000
     attributes = read_recording(tmp_path / "a.h5").attributes
     assert attributes["film"] == "p" and attributes["transfer"] == "srgb" and attributes["gain"] > 0
 
@@ -126,22 +127,19 @@ def test_record_has_a_frame_rate_of_its_own(tmp_path: Path) -> None:
         (("text.mp4",), "text.mp4 is not a film"),
         (("p",), "have no times; say film_rate_hz"),
         (("p", "--film-rate", "0"), "--film-rate 0.0; it must be"),
-        (("p", "--film-rate", "100", "--slow", "2"), "one of film_rate_hz, times_s and slow"),
-        (("p", "--film-rate", "100", "--transfer", "log"), "unknown transfer 'log'"),
-        (("p", "--film-rate", "100", "--channel", "red"), "the pictures are grey"),
-        (("p", "--film-rate", "100", "--mean-interval", "0.5"), "mean_interval = 0.5"),
+        (
+            ("p", "--film-rate", "100", "--transfer", "pq"),
+            "unknown transfer 'pq'; choose one of bt709, gamma2.2, linear",
+        ),
         (("p", "--film-rate", "100", "--mean-interval", "nan"), "--mean-interval nan; it must be"),
         (("p", "--film-rate", "100", "--frames", "0"), "--frames 0; it must be"),
         (("p", "--film-rate", "100", "--frames", "9999"), "p lasts 800 (0.02 s)"),
         (("p", "--film-rate", "100", "--seconds", "nan"), "--seconds nan"),
         (("p", "--film-rate", "100", "--seconds", "1", "--frames", "1"), "give one of the two"),
         (("p", "--film-rate", "1e5"), "it must last 1 or more"),
-        (("p", "--film-rate", "1e9"), "the film lasts 8e-05 frames"),
         (("p", "--film-rate", "100", "--frame-rate", "0"), "frame_rate_hz = 0"),
         (("p", "--film-rate", "100", "--size", "0", "24"), "--size 0 24; it must be"),
-        (("black", "--film-rate", "100"), "no light"),
-        (("mixed", "--film-rate", "100"), "picture 3 has shape, bits, transfer"),
-        (("gap", "--film-rate", "100"), "a picture seems missing"),
+        (("black.npy", "--film-rate", "100"), "no light"),
         (("p/list.csv",), "line 3: the time is 0 s"),
         (("object.npy", "--film-rate", "100"), "object.npy is not an .npy file"),
     ],
@@ -150,13 +148,7 @@ def test_what_is_wrong_ends_in_one_line_and_nothing_is_left(args, message, tmp_p
     monkeypatch.chdir(tmp_path)
     Path("text.mp4").write_text("a text " * 99)
     folder_of(Path("p"), [60, 200, 60])
-    folder_of(Path("mixed"), [60, 200])
-    Image.fromarray(np.zeros((8, 8), np.uint8)).save("mixed/p2.png")
-    folder_of(Path("gap"), [60, 200, 60, 70])
-    Path("gap/p2.png").unlink()
-    Path("black").mkdir()
-    for name in ("1.png", "2.png"):
-        Image.fromarray(np.zeros((8, 8), np.uint8)).save(Path("black") / name)
+    np.save("black.npy", np.zeros((2, 8, 8), np.uint8))
     if args[0] == "p/list.csv":
         Path("p/list.csv").write_text("name,time_s\np0.png,0\np1.png,0\n")
     np.save("object.npy", np.array([{}], object), allow_pickle=True)
@@ -165,10 +157,3 @@ def test_what_is_wrong_ends_in_one_line_and_nothing_is_left(args, message, tmp_p
     error = capsys.readouterr().err.strip().splitlines()[-1]
     assert error.startswith("spikecam: ") and message in error
     assert sorted(tmp_path.rglob("*")) == before
-
-
-def test_a_dat_opens_without_options(tmp_path: Path) -> None:
-    folder = folder_of(tmp_path / "p", [60, 200, 60])
-    assert spikecam("film", folder, "--film-rate", 800, "--out", tmp_path / "a.dat", "--frame-rate", 20000, *SMALL) == 0
-    recording = read_recording(tmp_path / "a.dat")
-    assert recording.spikes.shape[1:] == (16, 24) and recording.frame_rate_hz == 20000

@@ -21,6 +21,7 @@ def write_film(
     ticks: Sequence[int] | None = None,
     time_base: Fraction | None = None,
     options: dict[str, str] | None = None,
+    container_format: str | None = None,
     **tags: int,
 ) -> Path:
     """Pictures as arrays of codes in the pixel format `stored_as`.
@@ -29,7 +30,7 @@ def write_film(
         ticks: time stamp of each, in units of time_base; default 0, 1, 2 ... of 1 / rate.
         tags: color_trc, color_range, ... by their numbers in H.273.
     """
-    with av.open(str(path), "w") as container:
+    with av.open(str(path), "w", format=container_format) as container:
         stream: Any = container.add_stream(codec, rate=rate, options=options or {})
         first = frame_of(pictures[0], stored_as)
         stream.width, stream.height, stream.pix_fmt = first.width, first.height, stored_as
@@ -59,9 +60,11 @@ def yuv420(luma: np.ndarray, neutral: int) -> np.ndarray:
     return np.concatenate([luma, np.full((h // 2, w), neutral, luma.dtype)])
 
 
-def frame_of(picture: np.ndarray, stored_as: str) -> av.VideoFrame:
-    """A picture as PyAV's frame; YUV 4:2:0 and 4:2:2 as `yuv420` lays it out."""
-    if not stored_as.startswith("yuv"):
+def frame_of(picture: np.ndarray | av.VideoFrame, stored_as: str) -> av.VideoFrame:
+    """A picture as PyAV's frame; planar YUV 4:2:0 and 4:2:2 as `yuv420` lays it out."""
+    if isinstance(picture, av.VideoFrame):
+        return picture
+    if not stored_as.startswith(("yuv4", "yuvj")):
         return av.VideoFrame.from_ndarray(picture, format=stored_as)
     rows = 2 if stored_as.startswith("yuv422") else 3 / 2  # of luma and chroma together, for one of luma
     height, width = int(picture.shape[0] / rows), picture.shape[1]

@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 
 from scenes import Gaze, Scene, VideoScene
-from spikecam_env.errors import InputError
 
 
 def steps(pictures: int = 4, shape: tuple[int, int] = (6, 8)) -> np.ndarray:
@@ -60,23 +59,3 @@ def test_truth_says_that_flow_is_unknown() -> None:
     truth = VideoScene(steps(), 1000.0).truth(5)
     assert np.isnan(truth.flow).all() and truth.flow.shape == (6, 8, 2)
     assert not truth.object_id.any() and truth.depth is None
-
-
-@pytest.mark.parametrize(
-    ("film", "options", "message"),
-    [
-        (steps(), {}, "film_rate_hz is None"),
-        (steps(1), {"film_rate_hz": 9.0}, "T of 2 or more"),
-        (np.zeros((3, 4, 4, 2), np.uint8), {"film_rate_hz": 9.0}, "it must be"),
-        (np.zeros((3, 4, 4), np.int32), {"film_rate_hz": 9.0}, "int32"),
-        (np.full((3, 4, 4), 2.0), {"film_rate_hz": 9.0}, "floats must lie"),
-        (steps(), {"film_rate_hz": 9.0, "gamma": 0.0}, "gamma is 0"),
-        (steps(), {"film_rate_hz": 9.0, "light": (1.0, 0.0)}, "light is"),
-        (steps(), {"film_rate_hz": 9.0, "most_pictures": 1}, "most_pictures is 1"),
-        ("no such film.mp4", {}, "there is no film"),
-        (__file__, {}, "holds 0 pictures"),
-    ],
-)
-def test_bad_films_are_named(film, options: dict, message: str) -> None:
-    with pytest.raises(InputError, match=message):
-        VideoScene(film, **options)
