@@ -2,8 +2,8 @@
 
     picture = 255 * rate / `white`      rate: [spikes/frame], of a frame that is `age` frames old
 
-By default that is the picture of mode `picture`, one a step, at a small share of the cost of other modes; its age is 13
-frames.  Of `best` it is 17 to 32.
+By default that is the picture of mode `picture`, one a step, at a small share of the cost of other modes; its age is 12
+frames.
 
 Before the first plane is finished agents see the noisy rate of all frames so far (TFP), and the age is -1.
 """

@@ -2,13 +2,11 @@
 
     z = relu(fold [planes] + conditions + carried)          half resolution
     z' = join(z + up(coarse(z)))                            coarse: a quarter of the resolution, two residual blocks
-    shares, change, carried' = out(z'), tanh(keep(z'))
-    B = sum shares x rates                                  shares >= 0, sum 1: a softmax
-    picture = B + 2 sqrt(B + DARK) change                   [spikes/frame]
+    shares, own, carried' = out(z'), tanh(keep(z'))
+    picture = sum shares x (rates, own^2) - DARK            [spikes/frame]; shares >= 0, sum 1: a softmax
 
-Planes are roots of rates (`picture_window`).  Every rate plane has a share, so that a still scene can converge to its
-mean.  The change is a step in the root of the rate, where noise is about the same at any light.  Some 12 000
-multiplications a pixel.
+Planes are roots of rates + DARK (`picture_window`), where noise is about the same at any light, and so is the network's
+own estimate.  Every rate plane has a share, so that a still scene can converge to its mean.
 """
 
 from __future__ import annotations
@@ -22,7 +20,7 @@ from denoiser.networks.stream_network import Residual
 
 HIDDEN = 16
 """Channels of the hidden picture."""
-PICTURE_CHANNELS = (32, 32)
+PICTURE_CHANNELS = (32, 64)
 """At half and at quarter resolution."""
 
 
@@ -50,20 +48,20 @@ class PictureDnSS(nn.Module):
         self.coarse = nn.Sequential(conv_relu(fine, coarse, stride=2), *(Residual(coarse) for _ in range(2)))
         self.up = nn.ConvTranspose2d(coarse, fine, 2, 2)
         self.join = nn.Sequential(conv_relu(fine, fine), conv_relu(fine, fine))
-        self.out = nn.Conv2d(fine, 4 * (rates + 1), 1)
+        self.out = nn.Conv2d(fine, 4 * (rates + 2), 1)
         self.keep = nn.Conv2d(fine, HIDDEN, 1)
 
     def forward(self, planes: Tensor, conditions: Tensor, hidden: Tensor | None = None) -> tuple[Tensor, Tensor]:
         out, kept = self.passed(planes, conditions, hidden)
         height, width = planes.shape[-2:]
         # channels are those of the four pixels of a square, one after another
-        squares = out.float().unflatten(1, (2, 2, self.rates + 1)).permute(0, 3, 4, 1, 5, 2)
-        full = squares.reshape(len(out), self.rates + 1, height, width)
-        blend = (full[:, : self.rates].softmax(dim=1) * (planes[:, : self.rates].square() - self.dark)).sum(1, True)
-        return blend + 2 * (blend.clamp(min=0.0) + self.dark).sqrt() * full[:, self.rates :], kept
+        squares = out.float().unflatten(1, (2, 2, self.rates + 2)).permute(0, 3, 4, 1, 5, 2)
+        full = squares.reshape(len(out), self.rates + 2, height, width)
+        roots = torch.cat([planes[:, : self.rates], full[:, -1:]], dim=1)
+        return (full[:, :-1].softmax(dim=1) * roots.square()).sum(dim=1, keepdim=True) - self.dark, kept
 
     def passed(self, planes: Tensor, conditions: Tensor, hidden: Tensor | None) -> tuple[Tensor, Tensor]:
-        """Logits of the shares, and the change, (N, 4 (rates + 1), H/2, W/2), and the next hidden picture."""
+        """Logits of the shares, and the own root, (N, 4 (rates + 2), H/2, W/2), and the next hidden picture."""
         kind = self.stem.weight.dtype
         z = self.stem(planes.to(kind)) + self.conditions(conditions.to(kind))[..., None, None]
         if hidden is not None:

@@ -1,6 +1,6 @@
 """A pass of mode `picture` over inputs of many streams: the network, and its pictures in compiled code.
 
-The network gives logits and a change for each pixel (`networks.picture_network`); a kernel makes pictures of them, in
+The network gives logits and a root of its own for each pixel (`networks.picture_network`); a kernel makes pictures of them, in
 one reading of the planes, some times faster than torch would.  It agrees with the network's own `forward` to 1e-5.
 """
 
@@ -95,25 +95,23 @@ def _pictures(
     stop: int,
     pictures: NDArray[np.float32],
 ) -> None:
-    """Pictures (H, W) of the squares' rows begin .. stop, from logits (H/2, W/2, 4 (rates + 1))."""
-    root_dark, share = np.float32(dark), np.empty(rates, np.float32)
+    """Pictures (H, W) of the squares' rows begin .. stop, from logits (H/2, W/2, 4 (rates + 2))."""
+    share = np.empty(rates + 1, np.float32)
     for row in range(begin, stop):
         for column in range(logits.shape[1]):
             for corner in range(4):
-                y, x, first = 2 * row + corner // 2, 2 * column + corner % 2, corner * (rates + 1)
+                y, x, first = 2 * row + corner // 2, 2 * column + corner % 2, corner * (rates + 2)
                 most = np.float32(-1e30)
-                for i in range(rates):
+                for i in range(rates + 1):
                     most = max(most, logits[row, column, first + i])
-                for i in range(rates):
+                for i in range(rates + 1):
                     share[i] = _exponential(logits[row, column, first + i] - most)
-                total, blend = np.float32(0.0), np.float32(0.0)
+                own = logits[row, column, first + rates + 1]
+                total, blend = share[rates], share[rates] * own * own
                 for i in range(rates):
                     total += share[i]
-                    blend += share[i] * (planes[y, x, i] * planes[y, x, i] - root_dark)
-                blend = blend / total
-                change = logits[row, column, first + rates]
-                rate = blend + np.float32(2.0) * np.sqrt(max(blend, np.float32(0.0)) + root_dark) * change
-                pictures[y, x] = min(max(rate, np.float32(0.0)), np.float32(1.0))
+                    blend += share[i] * planes[y, x, i] * planes[y, x, i]
+                pictures[y, x] = min(max(blend / total - np.float32(dark), np.float32(0.0)), np.float32(1.0))
 
 
 @njit(cache=True, nogil=True, boundscheck=False, error_model="numpy")

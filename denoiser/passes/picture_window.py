@@ -31,7 +31,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -65,6 +65,11 @@ YOUTH = 256.0
 """Time in which a stream is no longer young, to the network [frames]."""
 
 _Q = np.uint64
+_ALL = _Q(0xFFFFFFFFFFFFFFFF)
+
+Words: TypeAlias = NDArray[np.uint64]
+"""(2, pixels), of ages 0 .. 63 and 64 .. 127; bit a is age a."""
+Counts: TypeAlias = NDArray[np.int64]
 
 
 @dataclass(frozen=True)
@@ -242,7 +247,7 @@ class PictureWindow:
         planes = np.empty((height + -height % MULTIPLE, width + -width % MULTIPLE, layout.layers), np.float32)
         instants = np.clip(look + np.asarray(layout.instants), 0, HISTORY - 1)
         counts, widths = np.asarray(layout.counts), np.asarray(layout.half_widths)
-        weights = np.asarray([1 / (1 - (1 - 1 / m) ** self.seen) for m in layout.memories], np.float32)
+        weights = np.asarray([1 / (1 - (1 - 1 / m) ** self.seen) for m in layout.memories], np.float32)[:, None]
         nothing = np.zeros(0, np.float32)
         gain, dark = (nothing, nothing) if self.unit is None else (self.unit.gain.ravel(), self.unit.dark.ravel())
 
@@ -251,7 +256,7 @@ class PictureWindow:
                 pixels = slice(width * row, width * (row + 1))
                 _paint(
                     self._bits[:, pixels], self._before[pixels], self.seen, look, instants, counts, widths,
-                    self._means[:, pixels], weights, self._last[pixels], self._sums[:, pixels], self._changed[pixels],
+                    self._means[:, pixels] * weights, self._last[pixels], self._sums[:, pixels], self._changed[pixels],
                     gain[pixels], dark[pixels], planes[row, :width],
                 )  # fmt: skip
 
@@ -284,7 +289,7 @@ def conditions_of(step: int, look: int, seen: int, *, mapped: bool) -> NDArray[n
 @njit(cache=True, nogil=True, boundscheck=False, error_model="numpy")
 def _advance(
     words: NDArray[np.uint64],
-    bits: NDArray[np.uint64],
+    bits: Words,
     before: NDArray[np.int32],
     shares: NDArray[np.float32],
     means: NDArray[np.float32],
@@ -315,63 +320,75 @@ def _advance(
                 means[m, p] += shares[m] * (rate - means[m, p])
 
 
-@njit(cache=True, nogil=True, boundscheck=False, error_model="numpy")
-def _at_or_before(recent: np.uint64, old: np.uint64, before: int, age: int) -> Any:
-    """Age of the youngest spike that is not younger than `age` (below 128)."""
-    if age < 64:
-        word = recent >> _Q(age)
-        if word:
-            return age + np.int64(lowest(word))
-        return 64 + np.int64(lowest(old)) if old else np.int64(before)
-    word = old >> _Q(age - 64)
-    return age + np.int64(lowest(word)) if word else np.int64(before)
+# The loops below are over a row of pixels, without branches, so that the compiler does eight pixels at a time.
 
 
 @njit(cache=True, nogil=True, boundscheck=False, error_model="numpy")
 def _below(age: int) -> Any:
-    """The bits 0 .. age of a word, without that of `age` (0 to 64)."""
-    if age <= 0:
-        return _Q(0)
-    return _Q(0xFFFFFFFFFFFFFFFF) >> _Q(64 - min(age, 64))
+    """The bits 0 .. age of a word, without that of `age`; none below 0, all from 64 on."""
+    held = min(max(age, 1), 64)
+    return _ALL >> _Q(64 - held) if age > 0 else _Q(0)
 
 
 @njit(cache=True, nogil=True, boundscheck=False, error_model="numpy")
-def _after(recent: np.uint64, old: np.uint64, age: int) -> Any:
-    """Age of the oldest spike that is younger than `age` (128 or less); -1: there is none."""
-    word = old & _below(age - 64)
-    if word:
-        return 64 + np.int64(highest(word))
-    word = recent & _below(age)
-    return np.int64(highest(word)) if word else -1
-
-
-@njit(cache=True, nogil=True, boundscheck=False, error_model="numpy")
-def _counted(recent: np.uint64, old: np.uint64, first: int, stop: int) -> Any:
+def _count(bits: Words, first: int, stop: int, out: Counts) -> None:
     """Spikes of ages first .. stop, without `stop` (128 or less)."""
-    young = ones(recent & _below(stop) & ~_below(first))
-    return np.int64(young + ones(old & _below(stop - 64) & ~_below(first - 64)))
+    recent, old = _below(stop) & ~_below(first), _below(stop - 64) & ~_below(first - 64)
+    for x in range(out.size):
+        out[x] = np.int64(ones(bits[0, x] & recent) + ones(bits[1, x] & old))
 
 
 @njit(cache=True, nogil=True, boundscheck=False, error_model="numpy")
-def _open(recent: np.uint64, old: np.uint64, before: int, spike: int) -> Any:
-    """Frames of the interval from the newest spike, of age `spike`, to now, at least."""
-    lasted = spike + 1
-    if spike < 127 and spike < before:
-        return max(lasted, _at_or_before(recent, old, before, spike + 1) - spike)
-    return lasted
+def _find_older(bits: Words, before: Counts, age: int, out: Counts) -> None:
+    """Age of the youngest spike of `age` (below 128) or more."""
+    shift, shift_old = _Q(min(age, 63)), _Q(max(age - 64, 0))
+    for x in range(out.size):
+        recent = bits[0, x] >> shift if age < 64 else _Q(0)
+        old = bits[1, x] >> shift_old
+        found = np.int64(max(age, 64)) + np.int64(lowest(old)) if old else before[x]
+        out[x] = np.int64(age) + np.int64(lowest(recent)) if recent else found
+
+
+@njit(cache=True, nogil=True, boundscheck=False, error_model="numpy")
+def _find_younger(bits: Words, age: int, out: Counts) -> None:
+    """Age of the oldest spike below `age` (128 or less); -1 where there is none."""
+    kept, kept_old = _below(age), _below(age - 64)
+    for x in range(out.size):
+        recent, old = bits[0, x] & kept, bits[1, x] & kept_old
+        found = np.int64(highest(recent)) if recent else np.int64(-1)
+        out[x] = np.int64(64) + np.int64(highest(old)) if old else found
+
+
+@njit(cache=True, nogil=True, boundscheck=False, error_model="numpy")
+def _measure_open(bits: Words, before: Counts, newest: Counts, out: Counts) -> None:
+    """Frames of the interval from the newest spike to now: at least as long as that before it."""
+    for x in range(out.size):
+        age = newest[x] + 1
+        recent = bits[0, x] >> _Q(min(age, 63)) if age < 64 else _Q(0)
+        old = bits[1, x] >> _Q(min(max(age - 64, 0), 63)) if age < 128 else _Q(0)
+        found = np.int64(max(age, 64)) + np.int64(lowest(old)) if old else before[x]
+        found = age + np.int64(lowest(recent)) if recent else found
+        out[x] = max(age, found - newest[x])
+
+
+@njit(cache=True, nogil=True, boundscheck=False, error_model="numpy")
+def _count_between(bits: Words, first: Counts, stop: Counts, out: Counts) -> None:
+    """Spikes of ages first .. stop of every pixel, without `stop`."""
+    for x in range(out.size):
+        recent, old = _below(stop[x]) & ~_below(first[x]), _below(stop[x] - 64) & ~_below(first[x] - 64)
+        out[x] = np.int64(ones(bits[0, x] & recent) + ones(bits[1, x] & old))
 
 
 @njit(cache=True, nogil=True, boundscheck=False, error_model="numpy")
 def _paint(
-    bits: NDArray[np.uint64],
-    before: NDArray[np.int32],
+    bits: Words,
+    last_before: NDArray[np.int32],
     seen: int,
     look: int,
-    instants: NDArray[np.int64],
-    counts: NDArray[np.int64],
-    widths: NDArray[np.int64],
+    instants: Counts,
+    counts: Counts,
+    widths: Counts,
     means: NDArray[np.float32],
-    weights: NDArray[np.float32],
     last: NDArray[np.float32],
     sums: NDArray[np.float32],
     changed: NDArray[np.float32],
@@ -380,58 +397,84 @@ def _paint(
     planes: NDArray[np.float32],
 ) -> None:
     """The planes (pixels, layers) of a row of pixels."""
-    one, root_dark = np.float32(1.0), np.float32(DARK)
-    rates = instants.size + counts.size + widths.size + 1 + weights.size
-    spikes, frames = np.empty(rates, np.float32), np.empty(rates, np.float32)
-    for p in range(before.size):
-        recent, old, oldest, out = bits[0, p], bits[1, p], np.int64(before[p]), planes[p]
-        at = 0
-        for i in range(instants.size):
-            age = min(instants[i], oldest)
-            spike, following = _at_or_before(recent, old, oldest, age), _after(recent, old, age)
-            length = spike - following if following >= 0 else _open(recent, old, oldest, spike)
-            spikes[at + i], frames[at + i] = one, np.float32(length)
-        at += instants.size
-        for i in range(counts.size):
-            first = max(look - counts[i] // 2, 0)
-            stop = min(first + counts[i], max(seen, first + 1))
-            spikes[at + i] = np.float32(_counted(recent, old, first, stop))
-            frames[at + i] = np.float32(stop - first)
-        at += counts.size
-        newest = _at_or_before(recent, old, oldest, 0)
-        for i in range(widths.size + 1):
-            begin, end = oldest, newest
-            if i < widths.size:
-                begin = _at_or_before(recent, old, oldest, min(look + widths[i], oldest))
-                inner = _after(recent, old, max(look - widths[i], 0) + 1)
-                end = inner if inner >= 0 else newest
-            n, length = 1, np.int64(0)
-            if begin > end:
-                n, length = _counted(recent, old, end, min(begin, 128)), begin - end
-            else:
-                length = _open(recent, old, oldest, newest)
-            spikes[at + i], frames[at + i] = np.float32(n), np.float32(length)
-        at += widths.size + 1
-        for i in range(weights.size):
-            spikes[at + i], frames[at + i] = means[i, p] * weights[i], one
-        if mapped_gain.size:
-            gain, dark, known = mapped_gain[p], mapped_dark[p], one
+    width = last_before.size
+    before = last_before.astype(np.int64)
+    newest, still_open, older, younger = np.empty((4, width), np.int64)
+    rates = instants.size + counts.size + widths.size + 1
+    spikes, frames = np.ones((rates, width), np.int64), np.empty((rates, width), np.int64)
+    _find_older(bits, before, 0, newest)
+    _measure_open(bits, before, newest, still_open)
+    at = 0
+    for i in range(instants.size):
+        age = min(instants[i], seen)
+        _find_older(bits, before, age, older)
+        _find_younger(bits, age, younger)
+        for x in range(width):
+            frames[at, x] = older[x] - younger[x] if younger[x] >= 0 else still_open[x]
+        at += 1
+    for i in range(counts.size):
+        first = max(look - counts[i] // 2, 0)
+        stop = min(first + counts[i], max(seen, first + 1))
+        _count(bits, first, stop, spikes[at])
+        frames[at] = stop - first
+        at += 1
+    for i in range(widths.size + 1):
+        if i < widths.size:
+            _find_older(bits, before, min(look + widths[i], seen), older)
+            _find_younger(bits, max(look - widths[i], 0) + 1, younger)
+            for x in range(width):
+                younger[x] = younger[x] if younger[x] >= 0 else newest[x]
         else:
-            gain = (sums[0, p] + np.float32(WINDOW_PRIOR)) / (sums[1, p] + np.float32(WINDOW_PRIOR))
-            gain, dark = min(max(gain, np.float32(0.5)), np.float32(2.0)), np.float32(0.0)
-            known = changed[p] / (one + changed[p])
-        share = one / gain
-        for i in range(rates):
-            out[i] = np.sqrt(max(spikes[i] / frames[i] - dark, np.float32(0.0)) * share + root_dark)
-        at = rates
-        out[at] = np.sqrt(last[p] + root_dark)
-        out[at + 1] = np.float32(4.0) * (gain - one)
-        out[at + 2] = known
+            older[:], younger[:] = before, newest
+        _count_between(bits, younger, older, spikes[at])
+        for x in range(width):
+            whole = older[x] > younger[x]
+            frames[at, x] = older[x] - younger[x] if whole else still_open[x]
+            spikes[at, x] = spikes[at, x] if whole else 1
+        at += 1
+    _correct(spikes, frames, means, last, sums, changed, mapped_gain, mapped_dark, planes)
+
+
+@njit(cache=True, nogil=True, boundscheck=False, error_model="numpy")
+def _correct(
+    spikes: NDArray[np.int64],
+    frames: NDArray[np.int64],
+    means: NDArray[np.float32],
+    last: NDArray[np.float32],
+    sums: NDArray[np.float32],
+    changed: NDArray[np.float32],
+    mapped_gain: NDArray[np.float32],
+    mapped_dark: NDArray[np.float32],
+    planes: NDArray[np.float32],
+) -> None:
+    """Roots of rates, without the pixel's gain, and the planes about it, of a row: (pixels, layers)."""
+    one, zero, root_dark, prior = np.float32(1.0), np.float32(0.0), np.float32(DARK), np.float32(WINDOW_PRIOR)
+    width, counted, averaged = last.size, len(spikes), len(means)
+    gain, dark = np.empty(width, np.float32), np.zeros(width, np.float32)
+    for x in range(width):
+        gain[x] = min(max((sums[0, x] + prior) / (sums[1, x] + prior), np.float32(0.5)), np.float32(2.0))
+    if mapped_gain.size:
+        gain[:], dark[:] = mapped_gain, mapped_dark
+    root = np.empty((counted + averaged, width), np.float32)
+    for i in range(counted):
+        for x in range(width):
+            rate = np.float32(spikes[i, x]) / np.float32(frames[i, x])
+            root[i, x] = np.sqrt(max(rate - dark[x], zero) / gain[x] + root_dark)
+    for i in range(averaged):
+        for x in range(width):
+            root[counted + i, x] = np.sqrt(max(means[i, x] - dark[x], zero) / gain[x] + root_dark)
+    at = counted + averaged
+    for x in range(width):
+        for i in range(at):
+            planes[x, i] = root[i, x]
+        planes[x, at] = np.sqrt(last[x] + root_dark)
+        planes[x, at + 1] = np.float32(4.0) * (gain[x] - one)
+        planes[x, at + 2] = one if mapped_gain.size else changed[x] / (one + changed[x])
 
 
 @njit(cache=True, nogil=True, boundscheck=False, error_model="numpy")
 def _learn(
-    bits: NDArray[np.uint64],
+    bits: Words,
     picture: NDArray[np.float32],
     last: NDArray[np.float32],
     look: int,
@@ -443,8 +486,10 @@ def _learn(
 ) -> None:
     """The sums for the gain, of the frames that the picture stands for, and how much the light has changed."""
     one = np.float32(1.0)
+    counted = np.empty(picture.size, np.int64)
+    _count(bits, look, look + frames, counted)
     for p in range(picture.size):
-        spikes = np.float32(_counted(bits[0, p], bits[1, p], look, look + frames))
+        spikes = np.float32(counted[p])
         mean = (one - of_last) * picture[p] + of_last * last[p]
         sums[0, p] = kept * sums[0, p] + spikes
         sums[1, p] = kept * sums[1, p] + np.float32(frames) * mean

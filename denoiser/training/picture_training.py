@@ -25,7 +25,7 @@ from numpy.typing import NDArray
 from torch import Tensor, nn
 
 from denoiser.ground.number_type import computing_in, number_type
-from denoiser.passes.picture_window import HISTORY, TYPICAL_LOOK, PictureInput, PictureLayout, PictureWindow
+from denoiser.passes.picture_window import DARK, HISTORY, TYPICAL_LOOK, PictureInput, PictureLayout, PictureWindow
 from denoiser.passes.pixel_map import GAINS, PixelMap
 from denoiser.training.pairs import TRAINING_KINDS, draw_model
 from denoiser.training.rollout import MAP_ERRORS, OFFSET, STEADY
@@ -284,7 +284,7 @@ class PictureLessons:
         """
         device = self.streams.device
         inputs, lights = zip(*(played.next() for played in playing), strict=True)
-        planes = torch.from_numpy(np.stack([one.planes for one in inputs])).to(device)
+        planes = torch.from_numpy(np.stack([one.planes for one in inputs])).permute(0, 3, 1, 2).to(device)
         conditions = torch.from_numpy(np.stack([one.conditions for one in inputs])).to(device)
         light = torch.from_numpy(np.ascontiguousarray(np.stack(lights))).to(device)
         some = next((p.hidden for p in playing if p.hidden is not None), None)
@@ -327,7 +327,8 @@ class PictureLessons:
                     continue
                 sums["network"] += float((picture.clamp(0, 1) - light).square().mean())
                 for name, plane in guesses.items():
-                    sums[name] += float(np.mean((seen.planes[plane] - light.cpu().numpy()[0, 0]) ** 2))
+                    guess = seen.planes[..., plane] ** 2 - DARK
+                    sums[name] += float(np.mean((guess - light.cpu().numpy()[0, 0]) ** 2))
             for name, value in sums.items():
                 logs[name].append(math.log(max(value / ((FRAMES - HISTORY) // 40), 1e-12) / peak**2))
         return {name: math.exp(float(np.mean(values))) for name, values in logs.items()}

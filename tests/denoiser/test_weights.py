@@ -8,7 +8,7 @@ import torch
 
 from denoiser.networks.reconstructor_recipe import LEARNED
 from denoiser.online import OnlineDnSS
-from denoiser.passes.recipe import RECIPES
+from denoiser.passes.recipe import MODES, RECIPES
 from denoiser.weights import load_weights, pretrained_path, save_weights
 from spikecam_env.errors import InputError
 
@@ -47,7 +47,7 @@ def test_shipped_weights_are_small_together():
     print(
         {name: f"{size / 1e6:.2f} MB" for name, size in sizes.items()}, f"{sum(sizes.values()) / 1e6:.2f} MB together"
     )
-    assert {f"{name}.pt" for name in (*RECIPES, "paper-no-refine", *LEARNED)} == set(sizes)
+    assert {f"{name}.pt" for name in (*MODES, "paper-no-refine", *LEARNED)} == set(sizes)
     assert sum(sizes.values()) < 12e6
 
 
