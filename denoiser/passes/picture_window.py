@@ -251,14 +251,15 @@ class PictureWindow:
         nothing = np.zeros(0, np.float32)
         gain, dark = (nothing, nothing) if self.unit is None else (self.unit.gain.ravel(), self.unit.dark.ravel())
 
+        means = self._means * weights
+
         def painted(_: int, rows: slice) -> None:
-            for row in range(rows.start, rows.stop):
-                pixels = slice(width * row, width * (row + 1))
-                _paint(
-                    self._bits[:, pixels], self._before[pixels], self.seen, look, instants, counts, widths,
-                    self._means[:, pixels] * weights, self._last[pixels], self._sums[:, pixels], self._changed[pixels],
-                    gain[pixels], dark[pixels], planes[row, :width],
-                )  # fmt: skip
+            of_rows = slice(width * rows.start, width * rows.stop)
+            _paint_rows(
+                self._bits[:, of_rows], self._before[of_rows], self.seen, look, instants, counts, widths,
+                means[:, of_rows], self._last[of_rows], self._sums[:, of_rows], self._changed[of_rows],
+                gain[of_rows], dark[of_rows], planes[rows],
+            )  # fmt: skip
 
         share_rows(painted, 1, height, planes.size)
         planes[:height, width:] = planes[:height, width - 1 : width]
@@ -377,6 +378,34 @@ def _count_between(bits: Words, first: Counts, stop: Counts, out: Counts) -> Non
     for x in range(out.size):
         recent, old = _below(stop[x]) & ~_below(first[x]), _below(stop[x] - 64) & ~_below(first[x] - 64)
         out[x] = np.int64(ones(bits[0, x] & recent) + ones(bits[1, x] & old))
+
+
+@njit(cache=True, nogil=True, boundscheck=False, error_model="numpy")
+def _paint_rows(
+    bits: Words,
+    before: NDArray[np.int32],
+    seen: int,
+    look: int,
+    instants: Counts,
+    counts: Counts,
+    widths: Counts,
+    means: NDArray[np.float32],
+    last: NDArray[np.float32],
+    sums: NDArray[np.float32],
+    changed: NDArray[np.float32],
+    mapped_gain: NDArray[np.float32],
+    mapped_dark: NDArray[np.float32],
+    planes: NDArray[np.float32],
+) -> None:
+    """The planes (rows, columns, layers) of some rows, whose border is not painted."""
+    width = before.size // len(planes)
+    for row in range(len(planes)):
+        begin, stop = width * row, width * (row + 1)
+        _paint(
+            bits[:, begin:stop], before[begin:stop], seen, look, instants, counts, widths, means[:, begin:stop],
+            last[begin:stop], sums[:, begin:stop], changed[begin:stop], mapped_gain[begin:stop],
+            mapped_dark[begin:stop], planes[row, :width],
+        )  # fmt: skip
 
 
 @njit(cache=True, nogil=True, boundscheck=False, error_model="numpy")
