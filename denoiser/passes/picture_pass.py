@@ -1,7 +1,7 @@
 """A pass of mode `picture` over inputs of many streams: the network, and its pictures in compiled code.
 
-The network gives logits and a root of its own for each pixel (`networks.picture_network`); a kernel makes pictures of them, in
-one reading of the planes, some times faster than torch would.  It agrees with the network's own `forward` to 1e-5.
+The network gives logits and a root of its own for each pixel (`networks.picture_network`).  A kernel makes pictures of
+them in one reading of the planes.  It agrees with the network's own `forward` to 1e-5.
 """
 
 from __future__ import annotations
