@@ -18,10 +18,9 @@ from tqdm import tqdm
 
 from denoiser.ground.captured import captured
 from denoiser.training.resumable_run import Run
-from denoiser.training.simulated import SimulatedStreams
-from denoiser.training.training_options import TrainingOptions
-from denoiser.training.training_record import training_record
-from denoiser.weights import AnyRecipe, save_weights
+from denoiser.training.train_config import TrainConfig, training_record
+from denoiser.training.training_source import TrainingSource
+from denoiser.weights import save_weights
 from spikecam_env.whole import whole_file, write_text_whole
 
 WARM_UP_STEPS = 100
@@ -30,13 +29,10 @@ RUN_FILE = "last.pt"
 
 
 def learn(
-    limits: TrainingOptions,
+    config: TrainConfig,
     run: Run,
-    recipe: AnyRecipe,
-    network: nn.Module,
-    loss: Callable[[], Tensor],
-    streams: SimulatedStreams,
-    validate: Callable[[], dict[str, float]],
+    source: TrainingSource,
+    validate: Callable[[nn.Module], dict[str, float]],
     *,
     began: float,
     progress: bool,
@@ -44,75 +40,75 @@ def learn(
     """Take steps to the end of the run; returns the path of the weights.
 
     Args:
-        limits: options of the training.
+        config: options of the training.
         run: to go on with.
-        recipe: of `network`.
-        network: of the run, whose weights are written.
-        loss: of the next step, with gradients.
-        streams: from which the loss follows.
-        validate: scores by name, "network_db" among them.
+        source: of the losses.
+        validate: scores of the network that is kept by name, "network_db" among them.
         began: begin of this part of the run, by `time.monotonic`.
         progress: shows a bar.
     """
+    network = run.network["student"] if isinstance(run.network, nn.ModuleDict) else run.network
     before, saved = run.seconds, time.monotonic()
-    bar = tqdm(total=limits.steps, initial=run.step, disable=not progress, mininterval=5.0, desc=limits.mode)
+    bar = tqdm(total=config.steps, initial=run.step, disable=not progress, mininterval=5.0, desc=config.mode)
     losses: list[Tensor] = []
-    weights = limits.out / f"{limits.mode}.pt"
+    weights = config.out / f"{config.mode}.pt"
 
     def save() -> Path:
-        record = training_record(limits, run.step, run.seconds, run.resumed_at)
-        save_weights(weights, limits.mode, recipe, network, record)
-        save_progress(limits.out, run)
+        record = training_record(config, run.step, run.seconds, run.resumed_at)
+        save_weights(weights, config.mode, config.recipe, network, record)
+        save_progress(config.out, run)
         return weights
 
-    run.set_rate(rate_at(limits.lr, 0, 0.0))  # of the steps that come before a capture
-    step = captured(lambda: _step(run, loss), streams.device, streams.rng)  # on a GPU a few steps are taken meanwhile
-    while (done := share_done(limits, run)) < 1.0:
-        run.set_rate(rate_at(limits.lr, run.step, done))
+    run.set_rate(rate_at(config.lr, 0, 0.0))  # of the steps that come before a capture
+    step = captured(
+        lambda: _step(run, source), source.streams.device, source.streams.rng
+    )  # on a GPU a few steps are taken meanwhile
+    while (done := share_done(config, run)) < 1.0:
+        run.set_rate(rate_at(config.lr, run.step, done))
         losses.append(step())
         run.step += 1
         run.seconds = before + time.monotonic() - began
         bar.update()
-        if run.step % limits.validate_every == 0:
-            scores = validate()
+        if run.step % config.validate_every == 0:
+            scores = validate(network)
             mean = float(torch.stack(losses).mean())
             run.curve.append({"step": run.step, "seconds": run.seconds, "loss": mean, **scores})
             losses.clear()
             bar.set_postfix(loss=mean, db=scores["network_db"])
-        if run.step % limits.validate_every == 0 or time.monotonic() - saved > limits.save_every_s:
+        if run.step % config.validate_every == 0 or time.monotonic() - saved > config.save_every_s:
             save()
             saved = time.monotonic()
     bar.close()
     return save()
 
 
-def begun(limits: TrainingOptions, network: nn.Module) -> Run:
+def begun(config: TrainConfig, network: nn.Module) -> Run:
     """A run before its first step, or the one that is in the folder, where that is to go on."""
-    run = Run.begin(network.to(limits.device, memory_format=torch.channels_last))  # type: ignore[call-overload]
-    if resumes(limits):
-        run.load(limits.out / RUN_FILE)
+    run = Run.begin(network.to(config.device, memory_format=torch.channels_last))  # type: ignore[call-overload]
+    if resumes(config):
+        run.load(config.out / RUN_FILE)
     torch.backends.cudnn.benchmark = True
     return run
 
 
-def resumes(limits: TrainingOptions) -> bool:
+def resumes(config: TrainConfig) -> bool:
     """Whether there is a run to go on with."""
-    return limits.resume and (limits.out / RUN_FILE).exists()
+    return config.resume and (config.out / RUN_FILE).exists()
 
 
-def _step(run: Run, loss: Callable[[], Tensor]) -> Tensor:
+def _step(run: Run, source: TrainingSource) -> Tensor:
     """One step; its loss, which a GPU may still be computing."""
     run.optimiser.zero_grad(set_to_none=True)
-    error = loss()
+    error = source.loss(run.network)
     error.backward()
     nn.utils.clip_grad_norm_(run.network.parameters(), 1.0)
     run.optimiser.step()
     return error.detach()
 
 
-def share_done(limits: TrainingOptions, run: Run) -> float:
+def share_done(config: TrainConfig, run: Run) -> float:
     """Share of the run that is over, by the clock where it is limited by minutes."""
-    return run.step / limits.steps if limits.minutes is None else run.seconds / (60 * limits.minutes)
+    return run.step / config.steps if config.minutes is None else run.seconds / (60 * config.minutes)
 
 
 def rate_at(highest: float, step: int, done: float) -> float:

@@ -1,0 +1,117 @@
+"""The sources of all training: streams from which networks learn, and by which one of them is judged.
+
+A mode is added by a class of `TrainingSource` and its row in `train_config.SOURCES`.
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Iterator, Mapping
+from typing import Any, ClassVar, NamedTuple
+
+import torch
+from torch import Tensor, nn
+
+from denoiser.ground.number_type import number_type
+from denoiser.training.simulated import TWINS, Bank, SimulatedStreams, in_turn
+from denoiser.weights import AnyRecipe
+from spikecam_env.numbers import WholeRange
+
+
+class HeldOut(NamedTuple):
+    """Streams of a validation."""
+
+    streams: int
+    patch: int | None = None
+    """Their side [pixels]; None: that of the training."""
+    passes: int | None = None
+    """Passes along them; None: the option `validate_passes`."""
+
+
+class Guesses(NamedTuple):
+    """Guesses of the light of N streams."""
+
+    light: Tensor
+    """(N, planes, H, W) [spikes/frame]."""
+    by_name: Mapping[str, tuple[Tensor, Tensor]]
+    """A guess (N, planes, H, W) and the weights (N,) of the streams, "network" among them."""
+
+
+class TrainingSource(ABC):
+    """Simulated streams that networks of a recipe learn from, some of them a step.
+
+    Args:
+        recipe: of the network.
+        taken: streams a step.
+        patch: their side [pixels].
+        device: of the streams.
+        seed: everything follows from it.
+        pool: streams for each one of a step; default: `pool` of the class.
+        bank: as for `SimulatedStreams`.
+        compiled: as for `SimulatedStreams`.
+    """
+
+    options: ClassVar[dict[str, Any]] = {"batch": 16, "validate_every": 1000, "validate_passes": 24, "start": None}
+    """Options of `TrainConfig` that not every mode has alike: those of this one, with their defaults."""
+    sides: ClassVar[WholeRange] = WholeRange(16, 128)
+    """Of a patch [pixels]."""
+    side_step: ClassVar[int] = 16
+    """A patch is a multiple of it [pixels]."""
+    held_out: ClassVar[HeldOut] = HeldOut(streams=8, patch=64)
+    whole_bank: ClassVar[bool] = False
+    """A short training draws as many textures and units as a long one."""
+    pool: ClassVar[int] = 1
+    twins: tuple[str, ...] = TWINS
+
+    def __init__(
+        self,
+        recipe: AnyRecipe,
+        *,
+        taken: int,
+        patch: int,
+        device: torch.device,
+        seed: int,
+        pool: int | None = None,
+        bank: Bank | None = None,
+        compiled: bool = False,
+    ) -> None:
+        self.recipe, self.taken = recipe, taken
+        count = taken * (self.pool if pool is None else pool)
+        self.streams = SimulatedStreams(count, patch, device, seed, bank=bank, compiled=compiled, twins=self.twins)
+        self._type = number_type("auto", device)
+        self._next = torch.zeros((), dtype=torch.int64, device=device)
+
+    @staticmethod
+    def networks(recipe: Any) -> nn.Module:
+        """The untrained network, or an `nn.ModuleDict` of those that learn together; "student" is the one to keep."""
+        network: nn.Module = recipe.network()
+        return network
+
+    @abstractmethod
+    def loss(self, network: nn.Module) -> Tensor:
+        """The loss of the next step, with gradients; `network` as `networks` gives it."""
+
+    @abstractmethod
+    def guesses(self, network: nn.Module, passes: int) -> Iterator[Guesses]:
+        """Guesses of the network that is kept, and simpler ones, in the next passes along some streams."""
+
+    @torch.no_grad()
+    def errors(self, network: nn.Module, passes: int) -> dict[str, float]:
+        """Mean squared errors against the light, by guess.
+
+        Args:
+            network: the one that is judged.
+            passes: along the streams.
+        """
+        sums: dict[str, Any] = {}
+        counts: dict[str, Any] = {}
+        for light, guesses in self.guesses(network, passes):
+            for name, (guess, weight) in guesses.items():
+                error = (weight * (guess - light).square().mean(dim=(1, 2, 3))).sum()
+                sums[name] = sums.get(name, 0.0) + error
+                counts[name] = counts.get(name, 0.0) + weight.sum()
+        return {name: float(total / counts[name].clamp(min=1)) for name, total in sums.items()}
+
+    def _turn(self) -> Tensor:
+        """Numbers (taken,) of the streams whose turn it is."""
+        return in_turn(self._next, self.taken, self.streams.count)
