@@ -35,28 +35,6 @@ def source_of(recipe: AnyRecipe) -> type[TrainingSource]:
     return SOURCES[recipe.target if isinstance(recipe, Recipe) else recipe.architecture]
 
 
-def _flag(value: Any, name: str) -> bool:
-    if not isinstance(value, bool):
-        raise InputError(f"{name} is {value!r}; it must be True or False")
-    return value
-
-
-def _folder(value: Any, name: str) -> Path:
-    if not isinstance(value, str | os.PathLike):
-        raise InputError(f"{name} is {value!r}; it must be the path of a folder")
-    return Path(value)
-
-
-def _weights(value: Any, name: str) -> str:
-    if not isinstance(value, str):
-        raise InputError(f"{name} is {value!r}; it must be the path of weights, or a mode's name")
-    return value
-
-
-def _channels(value: Any, _: str) -> tuple[int, int, int]:
-    return checked_channels(value)
-
-
 OF_MODE: Any = None
 """Stands for the mode's own default."""
 
@@ -145,6 +123,28 @@ class TrainConfig:
     def source(self) -> type[TrainingSource]:
         """The streams from which the network learns."""
         return source_of(self.recipe)
+
+
+def _flag(value: Any, name: str) -> bool:
+    return bool(_is_a(bool, value, name, "True or False"))
+
+
+def _folder(value: Any, name: str) -> Path:
+    return Path(_is_a((str, os.PathLike), value, name, "the path of a folder"))
+
+
+def _weights(value: Any, name: str) -> str:
+    return str(_is_a(str, value, name, "the path of weights, or a mode's name"))
+
+
+def _channels(value: Any, _: str) -> tuple[int, int, int]:
+    return checked_channels(value)
+
+
+def _is_a(kind: Any, value: Any, name: str, rule: str) -> Any:
+    if not isinstance(value, kind):
+        raise InputError(f"{name} is {value!r}; it must be {rule}")
+    return value
 
 
 MODES: dict[str, type[TrainingSource]] = {name: source_of(recipe) for name, recipe in (RECIPES | LEARNED).items()}
