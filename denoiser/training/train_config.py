@@ -126,25 +126,25 @@ class TrainConfig:
 
 
 def _flag(value: Any, name: str) -> bool:
-    return bool(_is_a(bool, value, name, "True or False"))
+    if not isinstance(value, bool):
+        raise InputError(f"{name} is {value!r}; it must be True or False")
+    return value
 
 
 def _folder(value: Any, name: str) -> Path:
-    return Path(_is_a((str, os.PathLike), value, name, "the path of a folder"))
+    if not isinstance(value, str | os.PathLike):
+        raise InputError(f"{name} is {value!r}; it must be the path of a folder")
+    return Path(value)
 
 
 def _weights(value: Any, name: str) -> str:
-    return str(_is_a(str, value, name, "the path of weights, or a mode's name"))
+    if not isinstance(value, str):
+        raise InputError(f"{name} is {value!r}; it must be the path of weights, or a mode's name")
+    return value
 
 
 def _channels(value: Any, _: str) -> tuple[int, int, int]:
     return checked_channels(value)
-
-
-def _is_a(kind: Any, value: Any, name: str, rule: str) -> Any:
-    if not isinstance(value, kind):
-        raise InputError(f"{name} is {value!r}; it must be {rule}")
-    return value
 
 
 MODES: dict[str, type[TrainingSource]] = {name: source_of(recipe) for name, recipe in (RECIPES | LEARNED).items()}
