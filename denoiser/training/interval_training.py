@@ -18,7 +18,7 @@ from torch import Tensor, nn
 from denoiser.ground.number_type import computing_in
 from denoiser.passes.recipe import Recipe
 from denoiser.training.pairs import WARM_UP
-from denoiser.training.training_source import Guesses, TrainingSource
+from denoiser.training.training_source import Guesses, SimulatedSource
 
 LOOK_AHEAD = 96
 """Frames after the middle one in which the clean interval's end is looked for; chosen here."""
@@ -45,10 +45,10 @@ class Taught(NamedTuple):
     """(N,) float32, 1 where the window counts."""
 
 
-class IntervalWindows(TrainingSource):
+class IntervalWindows(SimulatedSource):
     """Simulated streams, cut to the windows of a network of one plane a pass; streams are taken in turn."""
 
-    options = TrainingSource.options | {"refine": True}
+    options = SimulatedSource.options | {"refine": True}
     pool = POOL
 
     def __init__(self, recipe: Recipe, **streams: Any) -> None:
@@ -74,7 +74,7 @@ class IntervalWindows(TrainingSource):
         """Of the network, the noisy and the clean interval."""
         for predicted, target, light, noisy, valid in self._windows(network, passes):
             found = {"network": predicted, "interval": noisy, "clean interval": target}
-            yield Guesses(light, {name: (guess, valid) for name, guess in found.items()})
+            yield light, {name: (guess, valid) for name, guess in found.items()}
 
     def _windows(self, network: nn.Module, passes: int) -> Iterator[Taught]:
         """The next windows of the streams whose turn it is, and of those after them."""

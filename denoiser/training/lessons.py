@@ -23,8 +23,7 @@ from denoiser.networks import ssml
 from denoiser.networks.reconstructor_recipe import ReconstructorRecipe
 from denoiser.networks.spk2imgnet import CENTRES, WINDOW
 from denoiser.training.simulated import UNIT_SHAPE, SimulatedStreams
-from denoiser.training.training_source import Guesses, HeldOut, TrainingSource
-from spikecam_env.numbers import WholeRange
+from denoiser.training.training_source import Guesses, HeldOut, SimulatedSource
 
 FLOOR = 0.05
 """Light below which errors weigh the same [spikes/frame]; chosen here (`denoiser.training.rollout.OFFSET` is 0.02)."""
@@ -71,18 +70,17 @@ class RollingWindows:
         return LessonWindows(self._spikes, self._light, self._age >= self._spikes.shape[1])
 
 
-class Lesson(TrainingSource):
+class Lesson(SimulatedSource):
     """Simulated streams before a reconstructor, all of them in every step.
 
     Args:
         recipe: of the reconstructor.
         frames_a_step: by which the streams go on.
-        streams: as for `TrainingSource`.
+        streams: as for `SimulatedSource`.
     """
 
     options: ClassVar = {"batch": 64, "validate_every": 500, "width": None, "frames_a_step": 12}
-    sides = WholeRange(1, min(UNIT_SHAPE))
-    side_step = 1
+    sides = range(1, min(UNIT_SHAPE) + 1)
     held_out = HeldOut(streams=64, passes=4)
     whole_bank = True
     span: ClassVar[int]
@@ -124,7 +122,7 @@ class Lesson(TrainingSource):
                 "tfp41": spikes.float().mean(1, keepdim=True),
                 "tfi": ssml.interval_rate(spikes, middle),
             }
-            yield Guesses(light[:, middle, None], {name: (guess, old.float()) for name, guess in found.items()})
+            yield light[:, middle, None], {name: (guess, old.float()) for name, guess in found.items()}
 
 
 class Supervised(Lesson):

@@ -30,7 +30,7 @@ from denoiser.networks.stream_network import CARRY
 from denoiser.passes.recipe import Recipe
 from denoiser.passes.window import WindowLayout
 from denoiser.passes.window_torch import StreamWindows, learned, pushed
-from denoiser.training.training_source import Guesses, TrainingSource
+from denoiser.training.training_source import Guesses, SimulatedSource
 
 OFFSET = 0.02
 """Rate below which errors weigh the same [spikes/frame]; chosen here."""
@@ -95,19 +95,19 @@ class _Past:
         return cls(*(torch.zeros((streams, count, side, side), device=device) for count, side in shapes))
 
 
-class Rollouts(TrainingSource):
+class Rollouts(SimulatedSource):
     """Simulated streams before a network of many planes a pass, taken in turn.
 
     Args:
         recipe: of the network.
         teacher: a network of the same layout, whose rates are the target instead of the light.
-        streams: as for `TrainingSource`.
+        streams: as for `SimulatedSource`.
 
     Raises:
         InputError: `StreamWindows` cannot begin the layout.
     """
 
-    options = TrainingSource.options | {"channels": None, "teacher": None}
+    options = SimulatedSource.options | {"channels": None, "teacher": None}
     pool = POOL
     twins = ("noisy",)
 
@@ -136,7 +136,7 @@ class Rollouts(TrainingSource):
             bare = valid * (1 - mapped)
             found = {"network": (rate, bare), "mapped": (rate, valid * mapped)}
             found |= {"interval": (interval, bare), "mean": (mean, bare)}
-            yield Guesses(light, {name: (guess.clamp(0, 1), weight) for name, (guess, weight) in found.items()})
+            yield light, {name: (guess.clamp(0, 1), weight) for name, (guess, weight) in found.items()}
 
     def _passes(self, network: nn.Module, passes: int) -> Iterator[Pass]:
         """The next passes of the streams whose turn it is."""

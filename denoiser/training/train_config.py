@@ -1,4 +1,4 @@
-"""Options of every training and their checks, the sources of lessons by target, the record in a file of weights."""
+"""Options of every training and their checks, the sources by mode, the record in a file of weights."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from typing import Annotated, Any, get_type_hints
 from denoiser.ground.captured import checked_compiler
 from denoiser.networks.reconstructor_recipe import LEARNED, reconstructor_recipe
 from denoiser.networks.spk2imgnet import WINDOW
-from denoiser.passes.recipe import RECIPES, Recipe, checked_channels, recipe_of
+from denoiser.passes.recipe import checked_channels, recipe_of
 from denoiser.training.interval_training import IntervalWindows
 from denoiser.training.lessons import SelfTaught, Supervised
 from denoiser.training.rollout import Rollouts
@@ -22,18 +22,14 @@ from spikecam_env.numbers import MOST_WORKERS, Range, WholeRange
 from spikecam_env.sensor.kernels.cuda import checked_device
 
 SOURCES: dict[str, type[TrainingSource]] = {
-    "light": Rollouts,
-    "clean_inverse_interval": IntervalWindows,
-    "spk2imgnet": Supervised,
+    "best": Rollouts,
+    "fast": Rollouts,
+    "paper": IntervalWindows,
+    "spk2img-clean": Supervised,
+    "spk2img-noisy": Supervised,
     "ssml": SelfTaught,
 }
-"""By the target of a denoiser's recipe, or the architecture of a reconstructor's."""
-
-
-def source_of(recipe: AnyRecipe) -> type[TrainingSource]:
-    """The streams from which a network learns."""
-    return SOURCES[recipe.target if isinstance(recipe, Recipe) else recipe.architecture]
-
+"""By mode."""
 
 OF_MODE: Any = None
 """Stands for the mode's own default."""
@@ -87,14 +83,14 @@ class TrainConfig:
     ship.  A network with more channels, or with the refine module, is made smaller (`smaller`)."""
     teacher: Annotated[str | None, _weights] = None
     """Of `best` and `fast`: weights whose rates the network is to learn instead of the light, a file or "best"."""
-    width: int | None = None
+    width: Annotated[int | None, _width] = None
     """Channels of a reconstructor; None: the recipe's."""
     frames_a_step: Annotated[int, WholeRange(1, WINDOW).check] = OF_MODE
     """Frames by which the streams of a reconstructor go on: 12."""
 
     def __post_init__(self) -> None:
-        if self.mode not in [*MODES]:
-            raise unknown_name("mode", self.mode, MODES)
+        if self.mode not in [*SOURCES]:
+            raise unknown_name("mode", self.mode, SOURCES)
         source, hints = self.source, get_type_hints(type(self), include_extras=True)
         for field in fields(self):
             name, value = field.name, getattr(self, field.name)
@@ -105,8 +101,8 @@ class TrainConfig:
                 for check in getattr(hints[name], "__metadata__", ()):
                     value = check(value, name)
             object.__setattr__(self, name, value)
-        if source.sides.check(self.patch, "patch") % source.side_step:
-            raise InputError(f"patch is {self.patch}; it must be a multiple of {source.side_step}")
+        if WholeRange(source.sides[0], source.sides[-1]).check(self.patch, "patch") not in source.sides:
+            raise InputError(f"patch is {self.patch}; it must be a multiple of {source.sides.step}")
         checked_device(self.device, "train with --device cpu")
         if self.compiled:
             checked_compiler(self.device)
@@ -122,7 +118,7 @@ class TrainConfig:
     @property
     def source(self) -> type[TrainingSource]:
         """The streams from which the network learns."""
-        return source_of(self.recipe)
+        return SOURCES[self.mode]
 
 
 def _flag(value: Any, name: str) -> bool:
@@ -143,19 +139,22 @@ def _weights(value: Any, name: str) -> str:
     return value
 
 
+def _width(value: Any, _: str) -> int:
+    return reconstructor_recipe("ssml", value).width
+
+
 def _channels(value: Any, _: str) -> tuple[int, int, int]:
     return checked_channels(value)
 
 
-MODES: dict[str, type[TrainingSource]] = {name: source_of(recipe) for name, recipe in (RECIPES | LEARNED).items()}
 OF_SOME = {name for source in SOURCES.values() for name in source.options}
 """Options that not every mode has alike."""
 
 
 def _refuse_other_modes(name: str, mode: str) -> None:
     """InputError for an option that the mode does not have."""
-    if name in OF_SOME and name not in MODES[mode].options:
-        modes = sorted(other for other, source in MODES.items() if name in source.options)
+    if name in OF_SOME and name not in SOURCES[mode].options:
+        modes = sorted(other for other, source in SOURCES.items() if name in source.options)
         raise InputError(f"--{name.replace('_', '-')} is for {', '.join(modes)}; leave it out for {mode}")
 
 

@@ -6,16 +6,14 @@ A mode is added by a class of `TrainingSource` and its row in `train_config.SOUR
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Iterator, Mapping
-from typing import Any, ClassVar, NamedTuple
+from collections.abc import Iterator
+from typing import Any, ClassVar, NamedTuple, TypeAlias
 
 import torch
 from torch import Tensor, nn
 
 from denoiser.ground.number_type import number_type
 from denoiser.training.simulated import TWINS, Bank, SimulatedStreams, in_turn
-from denoiser.weights import AnyRecipe
-from spikecam_env.numbers import WholeRange
 
 
 class HeldOut(NamedTuple):
@@ -28,58 +26,22 @@ class HeldOut(NamedTuple):
     """Passes along them; None: the option `validate_passes`."""
 
 
-class Guesses(NamedTuple):
-    """Guesses of the light of N streams."""
-
-    light: Tensor
-    """(N, planes, H, W) [spikes/frame]."""
-    by_name: Mapping[str, tuple[Tensor, Tensor]]
-    """A guess (N, planes, H, W) and the weights (N,) of the streams, "network" among them."""
-
-
 class TrainingSource(ABC):
-    """Simulated streams that networks of a recipe learn from, some of them a step.
-
-    Args:
-        recipe: of the network.
-        taken: streams a step.
-        patch: their side [pixels].
-        device: of the streams.
-        seed: everything follows from it.
-        pool: streams for each one of a step; default: `pool` of the class.
-        bank: as for `SimulatedStreams`.
-        compiled: as for `SimulatedStreams`.
-    """
+    """Streams that networks of a recipe learn from, some of them a step."""
 
     options: ClassVar[dict[str, Any]] = {"batch": 16, "validate_every": 1000, "validate_passes": 24, "start": None}
     """Options of `TrainConfig` that not every mode has alike: those of this one, with their defaults."""
-    sides: ClassVar[WholeRange] = WholeRange(16, 128)
+    sides: ClassVar[range] = range(16, 129, 16)
     """Of a patch [pixels]."""
-    side_step: ClassVar[int] = 16
-    """A patch is a multiple of it [pixels]."""
     held_out: ClassVar[HeldOut] = HeldOut(streams=8, patch=64)
     whole_bank: ClassVar[bool] = False
     """A short training draws as many textures and units as a long one."""
-    pool: ClassVar[int] = 1
-    twins: tuple[str, ...] = TWINS
+    streams: Any
+    """With the `device` of the step and the generator `rng` of its draws."""
 
-    def __init__(
-        self,
-        recipe: AnyRecipe,
-        *,
-        taken: int,
-        patch: int,
-        device: torch.device,
-        seed: int,
-        pool: int | None = None,
-        bank: Bank | None = None,
-        compiled: bool = False,
-    ) -> None:
-        self.recipe, self.taken = recipe, taken
-        count = taken * (self.pool if pool is None else pool)
-        self.streams = SimulatedStreams(count, patch, device, seed, bank=bank, compiled=compiled, twins=self.twins)
-        self._type = number_type("auto", device)
-        self._next = torch.zeros((), dtype=torch.int64, device=device)
+    @abstractmethod
+    def __init__(self, recipe: Any, **streams: Any) -> None:
+        """With the arguments of `SimulatedSource`."""
 
     @staticmethod
     def networks(recipe: Any) -> nn.Module:
@@ -92,17 +54,56 @@ class TrainingSource(ABC):
         """The loss of the next step, with gradients; `network` as `networks` gives it."""
 
     @abstractmethod
+    def errors(self, network: nn.Module, passes: int) -> dict[str, float]:
+        """Mean squared errors against the light in the next passes, by guess: the network's ("network") and simpler
+        ones."""
+
+
+Guesses: TypeAlias = tuple[Tensor, dict[str, tuple[Tensor, Tensor]]]
+"""Light of N streams (N, planes, H, W); by name guesses of it, and the streams' weights (N,)."""
+
+
+class SimulatedSource(TrainingSource):
+    """Simulated streams, taken in turn.
+
+    Args:
+        recipe: of the network.
+        taken: streams a step.
+        patch: their side [pixels].
+        device: of the streams.
+        seed: everything follows from it.
+        pool: streams for each one of a step; default: `pool` of the class.
+        bank: as for `SimulatedStreams`.
+        compiled: as for `SimulatedStreams`.
+    """
+
+    pool: ClassVar[int] = 1
+    twins: tuple[str, ...] = TWINS
+
+    def __init__(
+        self,
+        recipe: Any,
+        *,
+        taken: int,
+        patch: int,
+        device: torch.device,
+        seed: int,
+        pool: int | None = None,
+        bank: Bank | None = None,
+        compiled: bool = False,
+    ) -> None:
+        self.taken = taken
+        count = taken * (self.pool if pool is None else pool)
+        self.streams = SimulatedStreams(count, patch, device, seed, bank=bank, compiled=compiled, twins=self.twins)
+        self._type = number_type("auto", device)
+        self._next = torch.zeros((), dtype=torch.int64, device=device)
+
+    @abstractmethod
     def guesses(self, network: nn.Module, passes: int) -> Iterator[Guesses]:
-        """Guesses of the network that is kept, and simpler ones, in the next passes along some streams."""
+        """Guesses of the light in the next passes."""
 
     @torch.no_grad()
     def errors(self, network: nn.Module, passes: int) -> dict[str, float]:
-        """Mean squared errors against the light, by guess.
-
-        Args:
-            network: the one that is judged.
-            passes: along the streams.
-        """
         sums: dict[str, Any] = {}
         counts: dict[str, Any] = {}
         for light, guesses in self.guesses(network, passes):

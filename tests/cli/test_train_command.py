@@ -10,6 +10,7 @@ import pytest
 from denoiser.networks.reconstructor_recipe import LEARNED
 from denoiser.passes.recipe import RECIPES
 from denoiser.training.train import TrainConfig
+from denoiser.training.train_config import SOURCES
 from spikecam_env.cli.main import run
 from spikecam_env.cli.train import Train
 
@@ -23,7 +24,7 @@ def trained(monkeypatch):
 
 
 def test_every_mode_has_its_training():
-    assert set(get_args(get_type_hints(Train)["mode"])) == {*RECIPES, *LEARNED}
+    assert set(get_args(get_type_hints(Train)["mode"])) == {*RECIPES, *LEARNED} == set(SOURCES)
 
 
 @pytest.mark.parametrize("mode", RECIPES)

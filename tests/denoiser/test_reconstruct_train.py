@@ -10,13 +10,13 @@ import torch
 
 from denoiser.networks import spk2imgnet, ssml
 from denoiser.networks.reconstructor_recipe import LEARNED, WIDTH_STEP, reconstructor_recipe
-from denoiser.training import lessons, training_loop, training_source
+from denoiser.training import lessons, training_source
 from denoiser.training import train as training
 from denoiser.training.lessons import Lesson, LessonWindows, RollingWindows
 from denoiser.training.resumable_run import Run
 from denoiser.training.simulated import TWINS, Bank, StreamBlock
 from denoiser.training.train import TrainConfig, train
-from denoiser.training.train_config import source_of
+from denoiser.training.train_config import SOURCES
 from denoiser.training.training_source import HeldOut
 from denoiser.weights import load_reconstructor
 from spikecam_env.errors import InputError
@@ -70,8 +70,7 @@ def same(a, b):
 
 def lesson_of(mode, width=WIDTH_STEP):
     """The lesson of a mode, and its networks untrained."""
-    recipe = reconstructor_recipe(mode, width)
-    return source_of(recipe), source_of(recipe).networks(recipe)
+    return SOURCES[mode], SOURCES[mode].networks(reconstructor_recipe(mode, width))
 
 
 def windows_of(span, seed=0):
@@ -293,25 +292,16 @@ def test_same_seed_same_weights(small, tmp_path):
 
 
 def test_a_stopped_run_goes_on_from_where_it_was(small, tmp_path, monkeypatch):
-    done = training_loop.share_done
-    monkeypatch.setattr(training_loop, "share_done", lambda config, run: 1.0 if run.step == 3 else done(config, run))
+    done = training.share_done
+    monkeypatch.setattr(training, "share_done", lambda config, run: 1.0 if run.step == 3 else done(config, run))
     before = weights_after(tmp_path)
-    monkeypatch.setattr(training_loop, "share_done", done)
+    monkeypatch.setattr(training, "share_done", done)
     after = weights_after(tmp_path)
     record = load_reconstructor(tmp_path / "spk2img-clean.pt")[2]
     assert record["resumed_at"] == [3] and record["steps"] == 5 and not same(before, after)
     run = Run.begin(lesson_of("spk2img-clean")[1])
     run.load(tmp_path / "last.pt")
     assert float(run.optimiser.state_dict()["state"][0]["step"]) == 5  # the moments came along
-
-
-def test_minutes_end_a_run(small, tmp_path):
-    """A second, of a thousand million steps."""
-    weights_after(tmp_path, "ssml", steps=10**9, minutes=1 / 60)
-    run = Run.begin(lesson_of("ssml")[1])
-    run.load(tmp_path / "last.pt")
-    print(run.step, run.seconds)
-    assert 1 <= run.seconds < 60
 
 
 def test_the_run_of_another_mode_or_width_is_refused(small, tmp_path):

@@ -12,11 +12,10 @@ import torch
 from denoiser.online import OnlineDnSS
 from denoiser.passes.recipe import RECIPES
 from denoiser.training import train as training
-from denoiser.training import training_loop
 from denoiser.training.resumable_run import Run
 from denoiser.training.rollout import Rollouts
 from denoiser.training.simulated import Bank
-from denoiser.training.train import TrainConfig, Validator, train
+from denoiser.training.train import TrainConfig, train, validation
 from denoiser.training.train_config import command
 from denoiser.training.training_source import HeldOut, TrainingSource
 from denoiser.weights import load_weights, pretrained_path
@@ -49,14 +48,14 @@ def test_same_seed_same_weights(small, tmp_path):
 
 def test_a_resumed_run_goes_on(small, tmp_path, monkeypatch):
     """Two steps, then the rest of four: weights and moments come back, the streams are others."""
-    done, seeds, drawn = training_loop.share_done, [], Rollouts.__init__
+    done, seeds, drawn = training.share_done, [], Rollouts.__init__
     monkeypatch.setattr(Rollouts, "__init__", lambda *a, seed, **o: seeds.append(seed) or drawn(*a, seed=seed, **o))
-    monkeypatch.setattr(training_loop, "share_done", lambda config, run: 1.0 if run.step == 2 else done(config, run))
+    monkeypatch.setattr(training, "share_done", lambda config, run: 1.0 if run.step == 2 else done(config, run))
     half = weights_after(tmp_path, 4)
     resumed = Run.begin(RECIPES["best"].network())
     resumed.load(tmp_path / "last.pt")
     assert same(resumed.network.state_dict(), half)
-    monkeypatch.setattr(training_loop, "share_done", done)
+    monkeypatch.setattr(training, "share_done", done)
     whole = weights_after(tmp_path, 4)
     record = load_weights(tmp_path / "best.pt")[2]
     moments = torch.load(tmp_path / "last.pt", weights_only=True)["optimiser"]["moments"]
@@ -84,8 +83,8 @@ def test_a_validation_changes_nothing_in_the_weights(small, tmp_path):
 
 def test_the_judge_is_the_same_at_every_validation(small):
     torch.manual_seed(0)
-    network, judge = RECIPES["best"].network().train(), Validator(TrainConfig(validate_passes=3))
-    first, again = judge.scores(network), judge.scores(network)
+    network, scores = RECIPES["best"].network().train(), validation(TrainConfig(validate_passes=3))
+    first, again = scores(network), scores(network)
     print(first)
     assert first == again and network.training and set(first) == {"network_db", "mapped_db", "interval_db", "mean_db"}
 
@@ -185,7 +184,7 @@ def test_minutes_end_a_run(small, tmp_path):
 def test_the_rate_of_learning_warms_up_and_falls_to_nothing():
     run, rates = Run.begin(torch.nn.Linear(1, 1)), []
     for step, done in ((0, 0.0), (99, 0.0), (1000, 0.5), (2000, 1.0)):
-        run.set_rate(training_loop.rate_at(2.0, step, done))
+        run.set_rate(training.rate_at(2.0, step, done))
         rates.append(run.optimiser.param_groups[0]["lr"])
     assert rates == pytest.approx([0.02, 2.0, 1.0, 0.0])
 
