@@ -337,7 +337,7 @@ def training(sizes: Sizes, device: torch.device) -> Rows:
     recipe, its = _best(device)
     its = its.float().requires_grad_(True).train()
     bank = Bank.drawn(0, device, textures=sizes.textures, units=sizes.units)
-    rollouts = Rollouts(recipe.layout, taken=sizes.patches, patch=sizes.side, device=device, seed=0, pool=2, bank=bank)
+    rollouts = Rollouts(recipe, taken=sizes.patches, patch=sizes.side, device=device, seed=0, pool=2, bank=bank)
     rows = torch.arange(sizes.patches, device=device)
     pairs = _seconds(lambda: rollouts.streams.advance(recipe.layout.planes, rows), device)
     step = _seconds(lambda: rollouts.loss(its, 3).backward(), device)

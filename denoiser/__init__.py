@@ -14,7 +14,7 @@ old_modules(
         "reconstruct.weights": "weights",
         "reconstruct.spk2imgnet": "networks.spk2imgnet",
         "run": "training.resumable_run",
-        "train": "training.train_denoiser",
+        "train": "training.train",
     },
 )
 

@@ -5,20 +5,10 @@ from __future__ import annotations
 import pytest
 import torch
 
-from denoiser.training.train_denoiser import TrainConfig, train
-from denoiser.training.train_reconstructor import ReconstructorConfig, train_reconstructor
+from denoiser.training.train import TrainConfig, train
 from spikecam_env.agents.ppo import PPO
 from spikecam_env.agents.training import Study, train_agent
 from spikecam_env.torch_settings import torch_settings
-
-LEARNERS = {
-    "denoiser.training.train_denoiser:_trained": lambda out: train(
-        TrainConfig(mode="best", out=out, threads=2, seed=7)
-    ),
-    "denoiser.training.train_reconstructor:_trained": lambda out: train_reconstructor(
-        ReconstructorConfig(mode="ssml", out=out, width=12, threads=2, seed=7)
-    ),
-}
 
 
 def test_settings_hold_within_and_not_after():
@@ -40,15 +30,16 @@ def test_they_do_not_hold_after_an_error_either():
     assert torch.get_num_threads() == 1
 
 
-@pytest.mark.parametrize("place", LEARNERS)
-def test_training_takes_its_own_and_leaves_them_to_the_caller(place, tmp_path, monkeypatch):
+def test_training_takes_its_own_and_leaves_them_to_the_caller(tmp_path, monkeypatch):
     """The computation has a stand-in: two threads of torch spin for minutes where other work has the processors."""
     seen = []
-    monkeypatch.setattr(place.replace(":", "."), lambda *_: seen.append((torch.get_num_threads(), torch.rand(3))))
+    monkeypatch.setattr(
+        "denoiser.training.train._trained", lambda *_: seen.append((torch.get_num_threads(), torch.rand(3)))
+    )
     torch.manual_seed(5)
     expected = torch.rand(3)
     torch.manual_seed(5)
-    LEARNERS[place](tmp_path)
+    train(TrainConfig(out=tmp_path, threads=2, seed=7))
     ((threads, drawn),) = seen
     assert threads == 2 and torch.equal(drawn, torch.rand(3, generator=torch.Generator().manual_seed(7)))
     assert torch.get_num_threads() == 1 and torch.equal(torch.rand(3), expected)

@@ -10,15 +10,15 @@ frames beyond it; a pixel that is darker than that is taught the interval up to 
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import torch
 from torch import Tensor, nn
 
-from denoiser.ground.number_type import computing_in, number_type
-from denoiser.passes.window import WindowLayout
+from denoiser.ground.number_type import computing_in
+from denoiser.passes.recipe import Recipe
 from denoiser.training.pairs import WARM_UP
-from denoiser.training.simulated import Bank, SimulatedStreams, in_turn
+from denoiser.training.training_source import Guesses, SimulatedSource
 
 LOOK_AHEAD = 96
 """Frames after the middle one in which the clean interval's end is looked for; chosen here."""
@@ -45,44 +45,24 @@ class Taught(NamedTuple):
     """(N,) float32, 1 where the window counts."""
 
 
-class IntervalWindows:
-    """Simulated streams, cut to the windows of a network of one plane a pass; streams are taken in turn.
+class IntervalWindows(SimulatedSource):
+    """Simulated streams, cut to the windows of a network of one plane a pass; streams are taken in turn."""
 
-    Args:
-        layout: of the windows.
-        taken: windows a step.
-        patch: side of the streams [pixels].
-        device: of the streams.
-        seed: everything follows from it.
-        pool: streams for each window of a step.
-        bank: as for `SimulatedStreams`.
-        compiled: as for `SimulatedStreams`.
-    """
+    options = SimulatedSource.options | {"refine": True}
+    pool = POOL
 
-    def __init__(
-        self,
-        layout: WindowLayout,
-        *,
-        taken: int,
-        patch: int,
-        device: torch.device,
-        seed: int,
-        pool: int = POOL,
-        bank: Bank | None = None,
-        compiled: bool = False,
-    ) -> None:
-        self.layout, self.taken = layout, taken
-        count = pool * taken
-        self.streams = SimulatedStreams(count, patch, device, seed, bank=bank, compiled=compiled)
-        self._next = torch.zeros((), dtype=torch.int64, device=device)
-        span = layout.past + 1 + LOOK_AHEAD
+    def __init__(self, recipe: Recipe, **streams: Any) -> None:
+        super().__init__(recipe, **streams)
+        self.layout = recipe.layout
+        count, patch, device = self.streams.count, self.streams.patch, self.streams.device
+        span = self.layout.past + 1 + LOOK_AHEAD
         full = (count, span, patch, patch)
         self._noisy, self._clean = (torch.zeros(full, dtype=torch.uint8, device=device) for _ in range(2))
         self._light = torch.zeros(full, device=device)
         self._last = torch.full((count, 2, patch, patch), span - 1, dtype=torch.int32, device=device)
         self._age = torch.zeros(count, device=device)
 
-    def loss(self, network: nn.Module, passes: int) -> Tensor:
+    def loss(self, network: nn.Module, passes: int = 1) -> Tensor:
         """Mean loss of `passes` windows of some streams, with gradients."""
         losses = []
         for predicted, target, _, _, valid in self._windows(network, passes):
@@ -90,29 +70,24 @@ class IntervalWindows:
             losses.append((valid * error).sum() / valid.sum().clamp(min=1))
         return torch.stack(losses).mean()
 
-    @torch.no_grad()
-    def errors(self, network: nn.Module, passes: int) -> dict[str, float]:
-        """Mean squared errors against the light: of the network, of the noisy and of the clean interval."""
-        sums, count = torch.zeros(3, device=self.streams.device), torch.zeros((), device=self.streams.device)
+    def guesses(self, network: nn.Module, passes: int) -> Iterator[Guesses]:
+        """Of the network, the noisy and the clean interval."""
         for predicted, target, light, noisy, valid in self._windows(network, passes):
-            for i, guess in enumerate((predicted, noisy, target)):
-                sums[i] += (valid * (guess - light).square().mean(dim=(1, 2, 3))).sum()
-            count += valid.sum()
-        return dict(zip(("network", "interval", "clean interval"), (sums / count.clamp(min=1)).tolist(), strict=True))
+            found = {"network": predicted, "interval": noisy, "clean interval": target}
+            yield light, {name: (guess, valid) for name, guess in found.items()}
 
     def _windows(self, network: nn.Module, passes: int) -> Iterator[Taught]:
         """The next windows of the streams whose turn it is, and of those after them."""
         device, middle, span = self.streams.device, self.layout.past, self.layout.span
-        kind = number_type("auto", device)
         for _ in range(passes):
-            rows = in_turn(self._next, self.taken, self.streams.count)
+            rows = self._turn()
             part = self.streams.advance(ADVANCE, rows)
             self._take(rows, part.noisy, part.clean, part.light, part.begins)
             noisy, clean = self._noisy[rows], self._clean[rows]
             interval = inverse_interval(noisy[:, :span], self._last[rows, 0], middle)
             target = inverse_interval(clean, self._last[rows, 1], middle)
-            with computing_in(kind, device):
-                predicted, _ = network(noisy[:, :span].to(kind), interval)
+            with computing_in(self._type, device):
+                predicted, _ = network(noisy[:, :span].to(self._type), interval)
             valid = (self._age[rows] >= noisy.shape[1] + WARM_UP).float()
             yield Taught(predicted.float(), target, self._light[rows, middle, None], interval, valid)
 

@@ -17,7 +17,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 import torch
@@ -25,13 +25,24 @@ from numpy.typing import NDArray
 from torch import Tensor, nn
 
 from denoiser.ground.number_type import computing_in, number_type
-from denoiser.passes.picture_window import DARK, HISTORY, TYPICAL_LOOK, PictureInput, PictureLayout, PictureWindow
+from denoiser.passes.picture_window import (
+    DARK,
+    HISTORY,
+    TYPICAL_LOOK,
+    TYPICAL_STEP,
+    PictureInput,
+    PictureLayout,
+    PictureWindow,
+)
 from denoiser.passes.pixel_map import GAINS, PixelMap
-from denoiser.training.pairs import TRAINING_KINDS, draw_model
+from denoiser.passes.recipe import PictureRecipe
+from denoiser.training.pairs import draw_model
 from denoiser.training.rollout import MAP_ERRORS, OFFSET, STEADY
+from denoiser.training.simulated import Bank
+from denoiser.training.training_source import HeldOut, TrainingSource
 from scenes.flat.collage import Collage
 from scenes.protocol import Gaze
-from scenes.textures import Texture, random_texture
+from scenes.textures import Texture
 from spikecam_env.sensor import Keyframes, SpikeSensor
 from spikecam_env.sensor.kernels import fast
 from spikecam_env.sensor.light import GRAINS
@@ -40,13 +51,14 @@ from spikecam_env.types import Floats, Pictures, Spikes
 
 FRAMES = 1024
 """Of a stream."""
-POOL = 256
-"""Streams that are kept."""
+POOL, VALIDATED = 256, 16
+"""Streams that are kept, in training and in a validation."""
+PASSES = 4
+"""Pictures by which a step of training takes a stream on."""
 REPLACED = 24
 """Steps of training for each new stream."""
 SLOTS = 8
 """Streams that are played for each one that a step of training takes on."""
-TEXTURES = 256
 SPEEDS = (0.02, 3.0)
 """Of the fastest layer, from least to greatest, even in its logarithm [pixels/frame]."""
 STILL = 0.2
@@ -203,49 +215,50 @@ class Host:
     rng: torch.Generator
 
 
-class PictureLessons:
-    """Simulated streams before a network of this layout, taken in turn.
+class PictureLessons(TrainingSource):
+    """Simulated streams before networks of a `PictureRecipe`, taken in turn.
 
     Args:
-        layout: of the planes.
+        recipe: of the network.
         taken: streams a step of training.
         patch: their side [pixels].
         device: of the network.
         seed: everything follows from it.
         pool: streams that are kept.
-        progress: shows a bar while these are simulated.
+        bank: of which the textures are used.
     """
+
+    options: ClassVar[dict[str, Any]] = {"batch": 8, "validate_every": 1000, "start": None}
+    held_out: ClassVar[HeldOut] = HeldOut(streams=1, patch=80, passes=HISTORY)
 
     def __init__(
         self,
-        layout: PictureLayout,
+        recipe: PictureRecipe,
         *,
         taken: int,
         patch: int,
         device: torch.device,
         seed: int,
-        pool: int = POOL,
-        slots: int = SLOTS,
-        progress: bool = False,
+        pool: int | None = None,
+        bank: Bank | None = None,
         **_: Any,
     ) -> None:
-        from tqdm import trange
-
-        self.layout, self._patch = layout, patch
+        self.layout, self._patch = recipe.layout, patch
         self.streams = Host(device, torch.Generator(device).manual_seed(seed))
         self._rng = np.random.default_rng([seed, 0x91C7])
         self._type = number_type("auto", device)
-        self._textures = [random_texture(self._rng, 256, TRAINING_KINDS) for _ in range(min(TEXTURES, 4 * pool))]
-        bar = trange(pool, desc="streams", disable=not progress, leave=False)
-        self._pool = [simulated_stream(self._rng, patch, self._textures) for _ in bar]
-        self._playing = [self._begun() for _ in range(slots * taken)]
+        bank = Bank.drawn(seed, torch.device("cpu"), units=0) if bank is None else bank
+        self._textures = list(bank.textures.cpu().numpy())
+        count = VALIDATED if pool is not None else min(POOL, 32 * taken)
+        self._pool = [simulated_stream(self._rng, patch, self._textures) for _ in range(count)]
+        self._playing = [self._begun() for _ in range(SLOTS * taken)]
         self._taken, self._next, self._steps = taken, 0, 0
 
     def _begun(self) -> Played:
         return Played.begin(self._pool[int(self._rng.integers(len(self._pool)))], self._rng, self.layout)
 
-    def loss(self, network: nn.Module, passes: int) -> Tensor:
-        """Take some streams on by this many pictures; the mean loss of these, with gradients."""
+    def loss(self, network: nn.Module) -> Tensor:
+        """Take some streams on by PASSES pictures; the mean loss of these, with gradients."""
         self._steps += 1
         if self._steps % REPLACED == 0:
             self._pool[int(self._rng.integers(len(self._pool)))] = simulated_stream(
@@ -254,7 +267,7 @@ class PictureLessons:
         rows = [(self._next + i) % len(self._playing) for i in range(self._taken)]
         self._next = (self._next + self._taken) % len(self._playing)
         total: list[Tensor] = []
-        for _ in range(passes):
+        for _ in range(PASSES):
             for row in rows:
                 self._playing[row].vary(self._rng)
                 if self._playing[row].is_over:
@@ -271,7 +284,7 @@ class PictureLessons:
             played = self._playing[row]
             assert played.hidden is not None and played.error is not None
             played.hidden, played.error = played.hidden.detach(), played.error.detach()
-        return torch.stack(total).sum() / passes
+        return torch.stack(total).sum() / PASSES
 
     def _pass(
         self, network: nn.Module, playing: list[Played]
@@ -309,7 +322,7 @@ class PictureLessons:
 
         Args:
             network: that is judged.
-            passes: from which on pictures count.
+            passes: frames of each stream before its pictures count.
 
         Returns:
             Of the network, of 1/ISI ("interval") and of a count of 40 frames ("mean"), as geometric means over streams.
@@ -323,12 +336,12 @@ class PictureLessons:
             sums = dict.fromkeys(logs, 0.0)
             while not played.is_over:
                 (seen,), picture, light, _, _ = self._pass(network, [played])
-                if played.place <= HISTORY:
+                if played.place <= passes:
                     continue
                 sums["network"] += float((picture.clamp(0, 1) - light).square().mean())
                 for name, plane in guesses.items():
                     guess = seen.planes[..., plane] ** 2 - DARK
                     sums[name] += float(np.mean((guess - light.cpu().numpy()[0, 0]) ** 2))
             for name, value in sums.items():
-                logs[name].append(math.log(max(value / ((FRAMES - HISTORY) // 40), 1e-12) / peak**2))
+                logs[name].append(math.log(max(value / ((FRAMES - passes) // TYPICAL_STEP), 1e-12) / peak**2))
         return {name: math.exp(float(np.mean(values))) for name, values in logs.items()}

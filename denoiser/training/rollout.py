@@ -20,16 +20,17 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import torch
 from torch import Tensor, nn
 
-from denoiser.ground.number_type import computing_in, number_type
+from denoiser.ground.number_type import computing_in
 from denoiser.networks.stream_network import CARRY
+from denoiser.passes.recipe import Recipe
 from denoiser.passes.window import WindowLayout
 from denoiser.passes.window_torch import StreamWindows, learned, pushed
-from denoiser.training.simulated import Bank, SimulatedStreams, in_turn
+from denoiser.training.training_source import Guesses, SimulatedSource
 
 OFFSET = 0.02
 """Rate below which errors weigh the same [spikes/frame]; chosen here."""
@@ -43,6 +44,9 @@ MAPPED = 0.5
 MAP_ERRORS = (0.001, 0.01)
 """Relative error of a map's gains, and of its dark rates to their mean, from least to greatest, even in its logarithm.
 SNEE's maps of 13 flats of 8000 frames are near the lower end."""
+
+PASSES = 3
+"""Of each stream in a step."""
 
 POOL = 16
 """Streams for each one that a step takes on."""
@@ -91,46 +95,30 @@ class _Past:
         return cls(*(torch.zeros((streams, count, side, side), device=device) for count, side in shapes))
 
 
-class Rollouts:
-    """Simulated streams before a network of this layout, taken in turn.
+class Rollouts(SimulatedSource):
+    """Simulated streams before a network of many planes a pass, taken in turn.
 
     Args:
-        layout: of the windows.
-        taken: streams a step.
-        patch: their side [pixels].
-        device: of streams and windows.
-        seed: everything follows from it.
-        pool: streams for each one of a step.
-        bank: as for `SimulatedStreams`.
-        compiled: as for `SimulatedStreams`.
+        recipe: of the network.
         teacher: a network of the same layout, whose rates are the target instead of the light.
+        streams: as for `SimulatedSource`.
 
     Raises:
         InputError: `StreamWindows` cannot begin the layout.
     """
 
-    def __init__(
-        self,
-        layout: WindowLayout,
-        *,
-        taken: int,
-        patch: int,
-        device: torch.device,
-        seed: int,
-        pool: int = POOL,
-        bank: Bank | None = None,
-        compiled: bool = False,
-        teacher: nn.Module | None = None,
-    ) -> None:
-        self.layout, self.taken, self.teacher = layout, taken, teacher
-        count = pool * taken
-        self.streams = SimulatedStreams(count, patch, device, seed, bank=bank, compiled=compiled, twins=("noisy",))
-        self._type = number_type("auto", device)
-        self._next = torch.zeros((), dtype=torch.int64, device=device)
-        self._windows = StreamWindows.begin(layout, count, (patch, patch), device)
-        self._past = _Past.begin(layout, count, patch, device, teacher is not None)
+    options = SimulatedSource.options | {"channels": None, "teacher": None}
+    pool = POOL
+    twins = ("noisy",)
 
-    def loss(self, network: nn.Module, passes: int) -> Tensor:
+    def __init__(self, recipe: Recipe, *, teacher: nn.Module | None = None, **streams: Any) -> None:
+        super().__init__(recipe, **streams)
+        self.layout, self.teacher = recipe.layout, teacher
+        count, patch, device = self.streams.count, self.streams.patch, self.streams.device
+        self._windows = StreamWindows.begin(self.layout, count, (patch, patch), device)
+        self._past = _Past.begin(self.layout, count, patch, device, teacher is not None)
+
+    def loss(self, network: nn.Module, passes: int = PASSES) -> Tensor:
         """Take some streams on by this many passes; mean loss of the passes, with gradients."""
         total: list[Tensor] = []
         for rate, wanted, before, _, valid, _ in self._passes(network, passes):
@@ -140,32 +128,20 @@ class Rollouts:
             total.append((weight * error.square()).mean() + STEADY * (weight * steps.square()).mean())
         return torch.stack(total).mean()
 
-    @torch.no_grad()
-    def errors(self, network: nn.Module, passes: int) -> dict[str, float]:
-        """Mean squared errors over some streams' passes, against the light.
-
-        Args:
-            network: that is judged.
-            passes: how many.
-
-        Returns:
-            Of the network without a map ("network") and with one ("mapped"); without one, of 1/ISI ("interval") and of
-            the running mean of the shortest memory ("mean").
-        """
-        names = ("network", "mapped", "interval", "mean")
-        sums, counts = torch.zeros(4, device=self.streams.device), torch.zeros(4, device=self.streams.device)
+    def guesses(self, network: nn.Module, passes: int) -> Iterator[Guesses]:
+        """Of the network without a map ("network") and with one ("mapped"); without one, 1/ISI ("interval") and the
+        running mean of the shortest memory ("mean")."""
         for rate, light, _, planes, valid, mapped in self._passes(network, passes):
-            guesses = (rate, rate, planes[:, : self.layout.planes], planes[:, self.layout.means[0], None])
-            for i, (guess, share) in enumerate(zip(guesses, (1 - mapped, mapped, 1 - mapped, 1 - mapped), strict=True)):
-                weight = valid * share
-                sums[i] += (weight * (guess.clamp(0, 1) - light).square().mean(dim=(1, 2, 3))).sum()
-                counts[i] += weight.sum()
-        return dict(zip(names, (sums / counts.clamp(min=1)).tolist(), strict=True))
+            interval, mean = planes[:, : self.layout.planes], planes[:, self.layout.means[0], None]
+            bare = valid * (1 - mapped)
+            found = {"network": (rate, bare), "mapped": (rate, valid * mapped)}
+            found |= {"interval": (interval, bare), "mean": (mean, bare)}
+            yield light, {name: (guess.clamp(0, 1), weight) for name, (guess, weight) in found.items()}
 
     def _passes(self, network: nn.Module, passes: int) -> Iterator[Pass]:
         """The next passes of the streams whose turn it is."""
         layout, device = self.layout, self.streams.device
-        rows = in_turn(self._next, self.taken, self.streams.count)
+        rows = self._turn()
         windows = self._windows.rows(rows)
         past = _Past(**{name: value[rows] for name, value in vars(self._past).items()})
         for _ in range(passes):

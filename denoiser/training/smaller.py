@@ -15,8 +15,7 @@ form.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, NamedTuple
 
 import torch
 from torch import Tensor, nn
@@ -28,10 +27,12 @@ RIDGE = 1e-4
 """Share of the kept channels' mean variance that is added to each, so that channels which agree can both be kept."""
 
 Weights = dict[str, Tensor]
+"""Of convolutions (inputs, outputs, height, width)."""
+Moments = dict[str, tuple[Tensor, Tensor]]
+"""By module the mean (C,) and the covariance (C, C) of its channels over pixels, float64."""
 
 
-@dataclass(frozen=True)
-class _Seen:
+class _Seen(NamedTuple):
     """Channels where some convolutions read them."""
 
     module: str
@@ -42,8 +43,7 @@ class _Seen:
     """Of a reader's inputs, the first of these channels."""
 
 
-@dataclass(frozen=True)
-class _Layer:
+class _Layer(NamedTuple):
     """Channels that must be kept together."""
 
     size: int
@@ -51,31 +51,6 @@ class _Layer:
     makers: tuple[str, ...]
     """Convolutions that make them."""
     seen: tuple[_Seen, ...]
-
-
-@dataclass
-class _Moments:
-    """Of channels over pixels: how many pixels, their sums (C,) and the sums of their products (C, C), float64."""
-
-    count: int = 0
-    sums: Any = 0.0
-    products: Any = field(default=0.0)
-
-    def add(self, channels: Tensor) -> None:
-        flat = channels.detach().movedim(1, 0).flatten(1).double()
-        self.count += flat.shape[1]
-        self.sums = self.sums + flat.sum(dim=1)
-        self.products = self.products + flat @ flat.T
-
-    @property
-    def mean(self) -> Tensor:
-        mean: Tensor = self.sums / self.count
-        return mean
-
-    @property
-    def covariance(self) -> Tensor:
-        covariance: Tensor = self.products / self.count - torch.outer(self.mean, self.mean)
-        return covariance
 
 
 def narrowed(network: StreamDnSS, channels: tuple[int, int, int], run: Callable[[nn.Module], object]) -> StreamDnSS:
@@ -88,11 +63,11 @@ def narrowed(network: StreamDnSS, channels: tuple[int, int, int], run: Callable[
     """
     layers = _layers(network)
     moments = _moments(network, (seen.module for layer in layers for seen in layer.seen), run)
-    weights = {name: value.detach().double() for name, value in network.state_dict().items()}
+    weights = {name: _inputs_first(name, value.double()) for name, value in network.state_dict().items()}
     for layer in layers:
         _keep(weights, layer, channels[layer.size], moments)
     small = network.with_channels(channels)
-    small.load_state_dict({name: value.float() for name, value in weights.items()})
+    small.load_state_dict({name: _inputs_first(name, value).float() for name, value in weights.items()})
     return small
 
 
@@ -130,12 +105,17 @@ def _layers(network: StreamDnSS) -> list[_Layer]:
     ]
 
 
-def _moments(network: nn.Module, modules: Iterable[str], run: Callable[[nn.Module], object]) -> dict[str, _Moments]:
+def _moments(network: nn.Module, modules: Iterable[str], run: Callable[[nn.Module], object]) -> Moments:
     """Of the outputs of these modules while `run` has the network compute."""
-    found = {name: _Moments() for name in modules}
+    sums: dict[str, list[Any]] = {name: [0, 0.0, 0.0] for name in modules}
+
+    def add(name: str, channels: Tensor) -> None:
+        flat, of = channels.movedim(1, 0).flatten(1).double(), sums[name]
+        of[:] = of[0] + flat.shape[1], of[1] + flat.sum(dim=1), of[2] + flat @ flat.T
+
     hooks = [
-        network.get_submodule(name).register_forward_hook(lambda _m, _in, out, of=of: of.add(out))
-        for name, of in found.items()
+        network.get_submodule(name).register_forward_hook(lambda _m, _in, out, name=name: add(name, out))
+        for name in sums
     ]
     try:
         with torch.no_grad():
@@ -143,29 +123,31 @@ def _moments(network: nn.Module, modules: Iterable[str], run: Callable[[nn.Modul
     finally:
         for hook in hooks:
             hook.remove()
-    return found
+    means = {name: total / count for name, (count, total, _) in sums.items()}
+    return {
+        n: (means[n], products / count - torch.outer(means[n], means[n])) for n, (count, _, products) in sums.items()
+    }
 
 
-def _keep(weights: Weights, layer: _Layer, count: int, moments: dict[str, _Moments]) -> None:
+def _keep(weights: Weights, layer: _Layer, count: int, moments: Moments) -> None:
     """Leave `count` channels of a layer, in its makers and in those that read it."""
-    covariance = sum(_weighed(weights, seen, moments[seen.module].covariance) for seen in layer.seen)
-    assert isinstance(covariance, Tensor)
-    kept = most_telling(covariance, count)
+    kept = most_telling(
+        torch.stack([_weighed(weights, seen, moments[seen.module][1]) for seen in layer.seen]).sum(0), count
+    )
     for seen in layer.seen:
-        of, size = moments[seen.module], len(covariance)
-        among = of.covariance[kept][:, kept]
+        mean, covariance = moments[seen.module]
+        among, size = covariance[kept][:, kept], len(covariance)
         ridge = RIDGE * among.diagonal().mean() * torch.eye(count, dtype=among.dtype)
-        others = torch.linalg.solve(among + ridge, of.covariance[kept]).T  # B, (C, kept)
-        rest = of.mean - others @ of.mean[kept]  # c
+        others = torch.linalg.solve(among + ridge, covariance[kept]).T  # B, (C, kept)
+        rest = mean - others @ mean[kept]  # c
         for reader in seen.readers:
-            whole = _inputs_first(weights, reader)
+            whole = weights[f"{reader}.weight"]
             before, mine, after = whole.split([seen.first, size, len(whole) - seen.first - size])
-            weights[f"{reader}.bias"] = weights[f"{reader}.bias"] + _bias(weights, reader, mine, rest)
-            read = torch.einsum("ck,c...->k...", others, mine)
-            _set_inputs_first(weights, reader, torch.cat([before, read, after]))
+            over = mine.mean(dim=(2, 3)) if reader == "up" else mine.sum(dim=(2, 3))  # outputs of `up` see one input
+            weights[f"{reader}.bias"] = weights[f"{reader}.bias"] + rest @ over
+            weights[f"{reader}.weight"] = torch.cat([before, torch.einsum("ck,c...->k...", others, mine), after])
     for maker in layer.makers:
-        outputs = 1 if maker == "up" else 0
-        weights[f"{maker}.weight"] = weights[f"{maker}.weight"].index_select(outputs, kept)
+        weights[f"{maker}.weight"] = weights[f"{maker}.weight"][:, kept]
         weights[f"{maker}.bias"] = weights[f"{maker}.bias"][kept]
 
 
@@ -185,27 +167,12 @@ def most_telling(covariance: Tensor, count: int) -> Tensor:
 
 def _weighed(weights: Weights, seen: _Seen, covariance: Tensor) -> Tensor:
     """The covariance with each channel times the norm of its weights in the readers."""
-    size = len(covariance)
-    squares = sum(
-        _inputs_first(weights, reader)[seen.first : seen.first + size].flatten(1).square().sum(dim=1)
-        for reader in seen.readers
-    )
-    assert isinstance(squares, Tensor)
-    norm = squares.sqrt()
+    mine = slice(seen.first, seen.first + len(covariance))
+    squares = [weights[f"{reader}.weight"][mine].flatten(1).square().sum(dim=1) for reader in seen.readers]
+    norm = torch.stack(squares).sum(0).sqrt()
     return norm[:, None] * covariance * norm
 
 
-def _inputs_first(weights: Weights, name: str) -> Tensor:
-    """Weights (inputs, outputs, height, width) of a convolution."""
-    weight = weights[f"{name}.weight"]
-    return weight if name == "up" else weight.transpose(0, 1)
-
-
-def _set_inputs_first(weights: Weights, name: str, value: Tensor) -> None:
-    weights[f"{name}.weight"] = value if name == "up" else value.transpose(0, 1)
-
-
-def _bias(weights: Weights, name: str, mine: Tensor, constant: Tensor) -> Tensor:
-    """The effect of constant channels (C,) on the outputs; a mean of four for `up`, whose outputs see one input."""
-    over = mine.mean(dim=(2, 3)) if name == "up" else mine.sum(dim=(2, 3))
-    return constant @ over
+def _inputs_first(name: str, value: Tensor) -> Tensor:
+    """Between the weights of a convolution and (inputs, outputs, height, width); those of `up` are so."""
+    return value.transpose(0, 1) if value.ndim == 4 and not name.startswith("up.") else value

@@ -2,26 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Literal
 
-from spikecam_env.errors import InputError
 from spikecam_env.numbers import Count, Positive, Range, Seed, WholeRange, Workers
-
-RECONSTRUCTORS = ("spk2img-clean", "spk2img-noisy", "ssml")
-DENOISERS = ("best", "fast", "paper")
-STREAMS = ("best", "fast")
-ONLY_OF = {
-    "refine": ("paper",),
-    "channels": STREAMS,
-    "start": DENOISERS,
-    "teacher": STREAMS,
-    "validate_passes": DENOISERS,
-    "width": RECONSTRUCTORS,
-    "frames_a_step": RECONSTRUCTORS,
-}
-"""Options that not every mode has, with the modes that have them."""
 
 
 @dataclass
@@ -34,7 +19,7 @@ class Train:
 
     out: Path
     """Folder of the run: weights, checkpoint to resume from, validation curve (JSON, PNG)."""
-    mode: Literal["best", "fast", "paper", "spk2img-clean", "spk2img-noisy", "ssml"] = "best"
+    mode: Literal["best", "fast", "paper", "picture", "spk2img-clean", "spk2img-noisy", "ssml"] = "best"
     """`paper`: the paper's network and loss; `best`: many rate planes a pass, trained on true light;
     `fast`: the same with a quarter of the weights.  The others are
     reconstructors, which make pictures of spikes."""
@@ -79,23 +64,7 @@ class Train:
     """Continue from the folder's checkpoint, if there is one."""
 
     def run(self) -> None:
-        print(f"wrote {_train(self.mode, self._options())}")
+        from denoiser.training.train import TrainConfig, train
 
-    def _options(self) -> dict[str, Any]:
-        """The given options that the mode has; others are refused."""
-        others = [name for name, modes in ONLY_OF.items() if self.mode not in modes]
-        for field in fields(self):
-            if field.name in others and getattr(self, field.name) != field.default:
-                option = field.name.replace("_", "-")
-                raise InputError(f"--{option} is for {', '.join(ONLY_OF[field.name])}; leave it out for {self.mode}")
-        return {name: value for name, value in vars(self).items() if value is not None and name not in others}
-
-
-def _train(mode: str, options: dict[str, Any]) -> Path:
-    if mode in RECONSTRUCTORS:
-        from denoiser.training.train_reconstructor import ReconstructorConfig, train_reconstructor
-
-        return train_reconstructor(ReconstructorConfig(**options))
-    from denoiser.training.train_denoiser import TrainConfig, train
-
-    return train(TrainConfig(**options))
+        given = {name: value for name, value in vars(self).items() if value is not None}
+        print(f"wrote {train(TrainConfig(**given))}")

@@ -12,7 +12,7 @@ from torch import nn
 from denoiser import DenoiseObservation, OnlineDnSS, denoise
 from denoiser.live import LiveDnSS
 from denoiser.passes.recipe import RECIPES
-from denoiser.training.train_denoiser import TrainConfig, started, train
+from denoiser.training.train import TrainConfig, started, train
 from denoiser.weights import load_weights
 from spikecam_env.envs.rotating_disk import RotatingDiskEnv
 from spikecam_env.errors import InputError, OwnCodeError

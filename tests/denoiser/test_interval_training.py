@@ -29,7 +29,7 @@ class Same(nn.Module):
 @pytest.fixture(scope="module")
 def taught(bank):
     """Windows of a few streams at many moments."""
-    windows = IntervalWindows(LAYOUT, taken=8, patch=16, device=CPU, seed=1, pool=1, bank=bank)
+    windows = IntervalWindows(RECIPES["paper"], taken=8, patch=16, device=CPU, seed=1, pool=1, bank=bank)
     return list(windows._windows(Same(), 40))
 
 
@@ -48,7 +48,7 @@ def test_the_interval_is_that_of_the_stream():
 
 def test_windows_and_intervals_are_those_of_their_stream(bank):
     """Every window's noisy and clean interval, from the frames that the streams gave since they began."""
-    windows = IntervalWindows(LAYOUT, taken=3, patch=16, device=CPU, seed=1, pool=1, bank=bank)
+    windows = IntervalWindows(RECIPES["paper"], taken=3, patch=16, device=CPU, seed=1, pool=1, bank=bank)
     parts, advance = [], windows.streams.advance
     windows.streams.advance = lambda frames, rows: parts.append(advance(frames, rows)) or parts[-1]
     compared = 0
@@ -99,7 +99,7 @@ def test_look_ahead_knows_the_interval_of_a_pixel_at_one_in_ninety():
 
 
 def test_young_streams_teach_nothing(bank, monkeypatch):
-    windows = IntervalWindows(LAYOUT, taken=2, patch=16, device=CPU, seed=1, pool=1, bank=bank)
+    windows = IntervalWindows(RECIPES["paper"], taken=2, patch=16, device=CPU, seed=1, pool=1, bank=bank)
     advance = windows.streams.advance
 
     def begun(frames, rows):
@@ -112,7 +112,7 @@ def test_young_streams_teach_nothing(bank, monkeypatch):
 
 def test_a_few_steps_lower_the_loss(bank, monkeypatch):
     monkeypatch.setattr(interval_training, "WARM_UP", 0)
-    windows = IntervalWindows(LAYOUT, taken=4, patch=16, device=CPU, seed=1, pool=1, bank=bank)
+    windows = IntervalWindows(RECIPES["paper"], taken=4, patch=16, device=CPU, seed=1, pool=1, bank=bank)
     windows.errors(Same(), 8)  # until they are old enough
     torch.manual_seed(0)
     network, losses = DnSS(), []

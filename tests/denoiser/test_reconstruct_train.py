@@ -10,13 +10,14 @@ import torch
 
 from denoiser.networks import spk2imgnet, ssml
 from denoiser.networks.reconstructor_recipe import LEARNED, WIDTH_STEP, reconstructor_recipe
-from denoiser.training import lessons, training_loop
-from denoiser.training import train_reconstructor as training
-from denoiser.training.lessons import LessonWindows, lesson_of
+from denoiser.training import lessons, training_source
+from denoiser.training import train as training
+from denoiser.training.lessons import Lesson, LessonWindows, RollingWindows
 from denoiser.training.resumable_run import Run
-from denoiser.training.rolling import RollingWindows
 from denoiser.training.simulated import TWINS, Bank, StreamBlock
-from denoiser.training.train_reconstructor import ReconstructorConfig, train_reconstructor
+from denoiser.training.train import TrainConfig, train
+from denoiser.training.train_config import SOURCES
+from denoiser.training.training_source import HeldOut
 from denoiser.weights import load_reconstructor
 from spikecam_env.errors import InputError
 from spikecam_env.streams import isi_plane
@@ -43,29 +44,33 @@ class Flats:
 
 class NoBank:
     @classmethod
-    def drawn(cls, seed, device, textures=0, units=0):
+    def drawn(cls, seed, device, **_):
         return cls()
 
 
 @pytest.fixture
 def small(monkeypatch):
-    monkeypatch.setattr(training, "SimulatedStreams", Flats)
+    monkeypatch.setattr(training_source, "SimulatedStreams", Flats)
     monkeypatch.setattr(training, "Bank", NoBank)
-    monkeypatch.setattr(training, "VALIDATION_STREAMS", 2)
-    monkeypatch.setattr(training, "VALIDATION_MOMENTS", 1)
+    monkeypatch.setattr(Lesson, "held_out", HeldOut(streams=2, passes=1))
 
 
 def config(out, mode="spk2img-clean", **options):
     small = {"batch": 4, "patch": 16, "width": WIDTH_STEP, "validate_every": 4, "steps": 5, "frames_a_step": 41}
-    return ReconstructorConfig(mode=mode, out=out, **(small | options))
+    return TrainConfig(mode=mode, out=out, **(small | options))
 
 
 def weights_after(out, mode="spk2img-clean", **options):
-    return load_reconstructor(train_reconstructor(config(out, mode, **options), progress=False))[1].state_dict()
+    return load_reconstructor(train(config(out, mode, **options), progress=False))[1].state_dict()
 
 
 def same(a, b):
     return all(torch.equal(a[name], b[name]) for name in a)
+
+
+def lesson_of(mode, width=WIDTH_STEP):
+    """The lesson of a mode, and its networks untrained."""
+    return SOURCES[mode], SOURCES[mode].networks(reconstructor_recipe(mode, width))
 
 
 def windows_of(span, seed=0):
@@ -78,12 +83,12 @@ def windows_of(span, seed=0):
 @pytest.mark.parametrize("mode", LEARNED)
 def test_a_few_steps_lower_the_loss(mode):
     torch.manual_seed(0)
-    lesson = lesson_of(reconstructor_recipe(mode, WIDTH_STEP))
+    lesson, networks = lesson_of(mode)
     windows = windows_of(lesson.span)
-    adam = torch.optim.Adam(lesson.networks.parameters(), 1e-3)
+    adam = torch.optim.Adam(networks.parameters(), 1e-3)
     losses = []
     for _ in range(10):
-        loss = lesson.losses(windows, torch.float32).mean()
+        loss = lesson.losses(networks, windows, torch.float32).mean()
         adam.zero_grad()
         loss.backward()
         adam.step()
@@ -96,32 +101,32 @@ def test_a_few_steps_lower_the_loss(mode):
 def test_every_weight_learns(mode):
     """No part of a network is without effect on its loss, once the displacements have left rest."""
     torch.manual_seed(0)
-    lesson = lesson_of(reconstructor_recipe(mode, WIDTH_STEP))
+    lesson, networks = lesson_of(mode)
     with torch.no_grad():
-        for weight in lesson.networks.parameters():
+        for weight in networks.parameters():
             if not weight.any():
                 weight.normal_(std=0.01)
-    lesson.losses(windows_of(lesson.span), torch.float32).mean().backward()
-    for name, weight in lesson.networks.named_parameters():
+    lesson.losses(networks, windows_of(lesson.span), torch.float32).mean().backward()
+    for name, weight in networks.named_parameters():
         assert weight.grad is not None and weight.grad.any(), name
 
 
 def test_ssml_does_not_see_the_light():
     torch.manual_seed(0)
-    lesson = lesson_of(reconstructor_recipe("ssml", WIDTH_STEP))
+    lesson, networks = lesson_of("ssml")
     windows = windows_of(lesson.span)
     other = LessonWindows(windows.spikes, torch.rand_like(windows.light), windows.old)
-    assert torch.equal(lesson.losses(windows, torch.float32), lesson.losses(other, torch.float32))
+    assert torch.equal(lesson.losses(networks, windows, torch.float32), lesson.losses(networks, other, torch.float32))
 
 
 @pytest.mark.parametrize("width", [12, 24, 36, 48])
 def test_the_gradients_are_finite_in_mixed_precision(width):
-    lesson = lesson_of(reconstructor_recipe("ssml", width))
-    lesson.networks.to(memory_format=torch.channels_last)
+    lesson, networks = lesson_of("ssml", width)
+    networks.to(memory_format=torch.channels_last)
     with torch.autocast("cpu", torch.bfloat16):
-        loss = lesson.losses(windows_of(lesson.span), torch.bfloat16).mean()
+        loss = lesson.losses(networks, windows_of(lesson.span), torch.bfloat16).mean()
     loss.backward()
-    assert all(bool(torch.isfinite(w.grad).all()) for w in lesson.networks.parameters())
+    assert all(bool(torch.isfinite(w.grad).all()) for w in networks.parameters())
 
 
 def test_the_blind_network_does_not_see_the_pixel_and_sees_its_neighbours():
@@ -180,19 +185,19 @@ def test_light_and_estimates_weigh_ten_to_one():
         def with_estimates(self, spikes):
             return self.light, self.estimates
 
-    lesson, windows = lesson_of(reconstructor_recipe("spk2img-clean", WIDTH_STEP)), windows_of(41)
+    (lesson, networks), windows = lesson_of("spk2img-clean"), windows_of(41)
     windows.light[:] = 0.1
-    lesson.networks["student"] = answers = Answers()
+    networks["student"] = answers = Answers()
     right, wrong = (torch.full((4, 5, 16, 16), value) for value in (0.1, 0.2))
     answers.light, answers.estimates = wrong[:, :1], right
-    assert lesson.losses(windows, torch.float32).tolist() == pytest.approx([0.1**2 / 0.25] * 4)
+    assert lesson.losses(networks, windows, torch.float32).tolist() == pytest.approx([0.1**2 / 0.25] * 4)
     answers.light, answers.estimates = right[:, :1], wrong
-    assert lesson.losses(windows, torch.float32).tolist() == pytest.approx([0.1 * 0.1**2 / 0.25] * 4)
+    assert lesson.losses(networks, windows, torch.float32).tolist() == pytest.approx([0.1 * 0.1**2 / 0.25] * 4)
 
 
 def test_the_label_knows_a_rate_of_one_in_sixty_whatever_the_phase():
     """Not one in 122: there the mean of the frames stands in."""
-    span = lesson_of(reconstructor_recipe("ssml", WIDTH_STEP)).span
+    span = lesson_of("ssml")[0].span
     for interval, whole in ((60, True), (122, False)):
         spikes = torch.zeros(1, span, 1, interval, dtype=torch.uint8)
         for phase in range(interval):
@@ -237,14 +242,13 @@ def test_a_window_counts_once_its_stream_is_old_enough():
 
 def test_windows_are_the_last_frames_of_the_stream_asked_for():
     flats = Flats(2)
-    parts = []
-    advance = flats.advance
+    parts, advance = [], flats.advance
     flats.advance = lambda frames: parts.append(advance(frames)) or parts[-1]
     rolling = RollingWindows(flats, "noisy", 41)
-    kept = [rolling.advance(frames).copy() for frames in (12, 12, 12, 12, 64)]
-    for stop, windows in ((4, kept[3]), (5, kept[4])):
-        assert torch.equal(windows.spikes, torch.cat([p.noisy for p in parts[:stop]], 1)[:, -41:])
-        assert torch.equal(windows.light, torch.cat([p.light for p in parts[:stop]], 1)[:, -41:])
+    for frames in (41, 12, 64):
+        windows = rolling.advance(frames)
+        assert torch.equal(windows.spikes, torch.cat([p.noisy for p in parts], 1)[:, -41:])
+        assert torch.equal(windows.light, torch.cat([p.light for p in parts], 1)[:, -41:])
 
 
 @pytest.mark.parametrize("mode", LEARNED)
@@ -260,8 +264,7 @@ def test_a_run_leaves_weights_and_a_curve(small, tmp_path, mode):
 
 def test_the_denoisers_streams_serve(tmp_path, monkeypatch):
     """As they are, but of few textures and units."""
-    monkeypatch.setattr(training, "VALIDATION_STREAMS", 2)
-    monkeypatch.setattr(training, "VALIDATION_MOMENTS", 1)
+    monkeypatch.setattr(Lesson, "held_out", HeldOut(streams=2, passes=1))
     few = {"textures": 4, "units": 1}
 
     class SmallBank(Bank):
@@ -289,25 +292,16 @@ def test_same_seed_same_weights(small, tmp_path):
 
 
 def test_a_stopped_run_goes_on_from_where_it_was(small, tmp_path, monkeypatch):
-    done = training_loop.share_done
-    monkeypatch.setattr(training_loop, "share_done", lambda limits, run: 1.0 if run.step == 3 else done(limits, run))
+    done = training.share_done
+    monkeypatch.setattr(training, "share_done", lambda config, run: 1.0 if run.step == 3 else done(config, run))
     before = weights_after(tmp_path)
-    monkeypatch.setattr(training_loop, "share_done", done)
+    monkeypatch.setattr(training, "share_done", done)
     after = weights_after(tmp_path)
     record = load_reconstructor(tmp_path / "spk2img-clean.pt")[2]
     assert record["resumed_at"] == [3] and record["steps"] == 5 and not same(before, after)
-    run = Run.begin(lesson_of(reconstructor_recipe("spk2img-clean", WIDTH_STEP)).networks)
+    run = Run.begin(lesson_of("spk2img-clean")[1])
     run.load(tmp_path / "last.pt")
     assert float(run.optimiser.state_dict()["state"][0]["step"]) == 5  # the moments came along
-
-
-def test_minutes_end_a_run(small, tmp_path):
-    """A second, of a thousand million steps."""
-    weights_after(tmp_path, "ssml", steps=10**9, minutes=1 / 60)
-    run = Run.begin(lesson_of(reconstructor_recipe("ssml", WIDTH_STEP)).networks)
-    run.load(tmp_path / "last.pt")
-    print(run.step, run.seconds)
-    assert 1 <= run.seconds < 60
 
 
 def test_the_run_of_another_mode_or_width_is_refused(small, tmp_path):
@@ -325,7 +319,7 @@ def test_young_streams_do_not_teach(small, tmp_path, monkeypatch):
             self.renewed = list(range(self.count))
             return super().advance(frames)
 
-    monkeypatch.setattr(training, "SimulatedStreams", Young)
+    monkeypatch.setattr(training_source, "SimulatedStreams", Young)
     torch.manual_seed(0)
-    first = lesson_of(reconstructor_recipe("ssml", WIDTH_STEP)).networks["student"].state_dict()
+    first = lesson_of("ssml")[1]["student"].state_dict()
     assert same({k: w.half().float() for k, w in first.items()}, weights_after(tmp_path, "ssml"))

@@ -8,11 +8,12 @@ from torch import nn
 
 from denoiser.networks.stream_network import CARRY
 from denoiser.passes.recipe import RECIPES
-from denoiser.training import rollout
+from denoiser.training import training_source
 from denoiser.training.rollout import Rollouts
 from denoiser.training.simulated import StreamBlock
 
-LAYOUT = RECIPES["best"].layout
+RECIPE = RECIPES["best"]
+LAYOUT = RECIPE.layout
 CPU = torch.device("cpu")
 PATCH = 16
 
@@ -59,13 +60,13 @@ class Answers(nn.Module):
 @pytest.fixture
 def flats(monkeypatch):
     """Two flats, both taken in every step."""
-    monkeypatch.setattr(rollout, "SimulatedStreams", Flats)
-    return Rollouts(LAYOUT, taken=2, patch=PATCH, device=CPU, seed=0, pool=1)
+    monkeypatch.setattr(training_source, "SimulatedStreams", Flats)
+    return Rollouts(RECIPE, taken=2, patch=PATCH, device=CPU, seed=0, pool=1)
 
 
 @pytest.fixture
 def simulated(bank):
-    return Rollouts(LAYOUT, taken=2, patch=32, device=CPU, seed=0, pool=2, bank=bank)
+    return Rollouts(RECIPE, taken=2, patch=32, device=CPU, seed=0, pool=2, bank=bank)
 
 
 def test_a_few_steps_lower_the_loss(simulated):
@@ -84,8 +85,8 @@ def test_a_few_steps_lower_the_loss(simulated):
 
 
 def test_streams_are_taken_in_turn(monkeypatch):
-    monkeypatch.setattr(rollout, "SimulatedStreams", Flats)
-    flats = Rollouts(LAYOUT, taken=2, patch=PATCH, device=CPU, seed=0, pool=2)
+    monkeypatch.setattr(training_source, "SimulatedStreams", Flats)
+    flats = Rollouts(RECIPE, taken=2, patch=PATCH, device=CPU, seed=0, pool=2)
     for _ in range(3):
         flats.loss(Answers([0.25] * 16), 2)
     assert flats.streams.taken == [[0, 1], [0, 1], [2, 3], [2, 3], [0, 1], [0, 1]]
@@ -117,12 +118,12 @@ def test_what_is_carried_reaches_the_next_pass_and_not_the_next_stream(flats):
 
 def test_a_teacher_is_wanted_instead_of_the_light_and_carries_on_its_own(monkeypatch):
     """Rates that rise like the teacher's cost nothing, though the light is another; the light does then cost."""
-    monkeypatch.setattr(rollout, "SimulatedStreams", Flats)
+    monkeypatch.setattr(training_source, "SimulatedStreams", Flats)
     rising = [0.3 + 0.02 * n for n in range(16)]
     losses = {}
     for name, rates in (("teacher's", rising), ("light", [Flats.light] * 16)):
         teacher = Answers(rising)
-        flats = Rollouts(LAYOUT, taken=2, patch=PATCH, device=CPU, seed=0, pool=1, teacher=teacher)
+        flats = Rollouts(RECIPE, taken=2, patch=PATCH, device=CPU, seed=0, pool=1, teacher=teacher)
         network = Answers(rates)
         network.carried = [None] * 10  # so that it counts its passes from 11 on
         losses[name] = [float(flats.loss(network, 1)) for _ in range(5)]
@@ -185,7 +186,7 @@ def test_steps_across_passes_count(flats):
 
 
 def test_half_of_the_streams_has_a_map_with_errors_of_a_thousandth_to_a_hundredth(bank):
-    streams = Rollouts(LAYOUT, taken=300, patch=PATCH, device=CPU, seed=0, pool=1, bank=bank)
+    streams = Rollouts(RECIPE, taken=300, patch=PATCH, device=CPU, seed=0, pool=1, bank=bank)
     rows, windows = torch.arange(300), streams._windows
     streams._calibrated(windows, torch.ones(300, dtype=torch.bool), rows)
     gain, dark = streams.streams.unit(rows)
@@ -200,7 +201,7 @@ def test_half_of_the_streams_has_a_map_with_errors_of_a_thousandth_to_a_hundredt
 
 
 def test_a_stream_keeps_its_map(bank):
-    streams = Rollouts(LAYOUT, taken=4, patch=PATCH, device=CPU, seed=0, pool=1, bank=bank)
+    streams = Rollouts(RECIPE, taken=4, patch=PATCH, device=CPU, seed=0, pool=1, bank=bank)
     rows, windows = torch.arange(4), streams._windows
     streams._calibrated(windows, torch.ones(4, dtype=torch.bool), rows)
     before = {name: getattr(windows, name).clone() for name in ("gain", "dark", "mapped")}

@@ -11,13 +11,13 @@ import torch
 
 from denoiser.online import OnlineDnSS
 from denoiser.passes.recipe import RECIPES
-from denoiser.training import train_denoiser as training
-from denoiser.training import training_loop
+from denoiser.training import train as training
 from denoiser.training.resumable_run import Run
+from denoiser.training.rollout import Rollouts
 from denoiser.training.simulated import Bank
-from denoiser.training.train_denoiser import TrainConfig, Validator, train
-from denoiser.training.train_reconstructor import ReconstructorConfig
-from denoiser.training.training_record import command
+from denoiser.training.train import TrainConfig, train, validation
+from denoiser.training.train_config import command
+from denoiser.training.training_source import HeldOut, TrainingSource
 from denoiser.weights import load_weights, pretrained_path
 from spikecam_env.errors import InputError
 
@@ -26,7 +26,8 @@ from spikecam_env.errors import InputError
 def small(monkeypatch, bank):
     """Few textures and units; four streams to validate on."""
     monkeypatch.setattr(Bank, "drawn", lambda *_, **__: bank)
-    monkeypatch.setattr(training, "VALIDATION_STREAMS", 4)
+    monkeypatch.setattr(TrainingSource, "held_out", HeldOut(streams=4, patch=64))
+    monkeypatch.setattr(training, "NARROWING_STREAMS", 4)
 
 
 def weights_after(out, steps, mode="best", validate_passes=3, **options):
@@ -47,14 +48,14 @@ def test_same_seed_same_weights(small, tmp_path):
 
 def test_a_resumed_run_goes_on(small, tmp_path, monkeypatch):
     """Two steps, then the rest of four: weights and moments come back, the streams are others."""
-    done, seeds, drawn = training_loop.share_done, [], training.source
-    monkeypatch.setattr(training, "source", lambda *a, seed, **o: seeds.append(seed) or drawn(*a, seed=seed, **o))
-    monkeypatch.setattr(training_loop, "share_done", lambda limits, run: 1.0 if run.step == 2 else done(limits, run))
+    done, seeds, drawn = training.share_done, [], Rollouts.__init__
+    monkeypatch.setattr(Rollouts, "__init__", lambda *a, seed, **o: seeds.append(seed) or drawn(*a, seed=seed, **o))
+    monkeypatch.setattr(training, "share_done", lambda config, run: 1.0 if run.step == 2 else done(config, run))
     half = weights_after(tmp_path, 4)
     resumed = Run.begin(RECIPES["best"].network())
     resumed.load(tmp_path / "last.pt")
     assert same(resumed.network.state_dict(), half)
-    monkeypatch.setattr(training_loop, "share_done", done)
+    monkeypatch.setattr(training, "share_done", done)
     whole = weights_after(tmp_path, 4)
     record = load_weights(tmp_path / "best.pt")[2]
     moments = torch.load(tmp_path / "last.pt", weights_only=True)["optimiser"]["moments"]
@@ -82,8 +83,8 @@ def test_a_validation_changes_nothing_in_the_weights(small, tmp_path):
 
 def test_the_judge_is_the_same_at_every_validation(small):
     torch.manual_seed(0)
-    network, judge = RECIPES["best"].network().train(), Validator(RECIPES["best"], 7, torch.device("cpu"), 3)
-    first, again = judge.scores(network), judge.scores(network)
+    network, scores = RECIPES["best"].network().train(), validation(TrainConfig(validate_passes=3))
+    first, again = scores(network), scores(network)
     print(first)
     assert first == again and network.training and set(first) == {"network_db", "mapped_db", "interval_db", "mean_db"}
 
@@ -166,7 +167,7 @@ def test_a_network_learns_the_rates_of_a_teacher(small, tmp_path):
 def test_a_teacher_of_another_mode_is_refused(small, tmp_path):
     with pytest.raises(InputError, match="weights of another mode; give a file of this mode"):
         train(TrainConfig(teacher="paper", out=tmp_path), progress=False)
-    with pytest.raises(InputError, match="teacher is for modes that learn the light"):
+    with pytest.raises(InputError, match="teacher is for best, fast; leave it out for paper"):
         TrainConfig(mode="paper", teacher="best")
     with pytest.raises(InputError, match="teacher is 3; it must be the path of weights"):
         TrainConfig(teacher=3)
@@ -183,7 +184,7 @@ def test_minutes_end_a_run(small, tmp_path):
 def test_the_rate_of_learning_warms_up_and_falls_to_nothing():
     run, rates = Run.begin(torch.nn.Linear(1, 1)), []
     for step, done in ((0, 0.0), (99, 0.0), (1000, 0.5), (2000, 1.0)):
-        run.set_rate(training_loop.rate_at(2.0, step, done))
+        run.set_rate(training.rate_at(2.0, step, done))
         rates.append(run.optimiser.param_groups[0]["lr"])
     assert rates == pytest.approx([0.02, 2.0, 1.0, 0.0])
 
@@ -204,15 +205,14 @@ def test_the_rate_of_learning_warms_up_and_falls_to_nothing():
 )
 def test_a_record_says_what_to_type(options, expected, monkeypatch):
     """And the command takes it for the same options."""
-    from spikecam_env.cli import main, train
+    from spikecam_env.cli.main import run
 
-    taken = {}
-    monkeypatch.setattr(train, "_train", lambda mode, options: taken.update(options))
+    taken = []
+    monkeypatch.setattr(training, "train", taken.append)
     config = TrainConfig(**options)
     assert command(config) == expected
-    assert main.run(expected.split()[1:]) == 0
-    given = {name: taken[name] for name in taken if name not in ("out", "resume", "threads")}
-    assert given == {name: getattr(config, name) for name in given} and given["mode"] == config.mode
+    assert run(expected.split()[1:]) == 0
+    assert taken == [replace(config, out="OUT", resume=True, threads=2)]
 
 
 def test_the_run_of_another_mode_is_refused(small, tmp_path):
@@ -221,13 +221,12 @@ def test_the_run_of_another_mode_is_refused(small, tmp_path):
         weights_after(tmp_path, 2, "best")
 
 
-@pytest.mark.parametrize("kind", [TrainConfig, ReconstructorConfig])
-def test_compiling_without_a_compiler_is_refused(kind, monkeypatch):
+def test_compiling_without_a_compiler_is_refused(monkeypatch):
     monkeypatch.setenv("PATH", "")
     monkeypatch.delenv("CXX", raising=False)
     with pytest.raises(InputError, match="compiler on a processor"):
-        kind(compiled=True)
-    assert not kind().compiled
+        TrainConfig(compiled=True)
+    assert not TrainConfig().compiled
 
 
 @pytest.mark.skipif(torch.cuda.is_available(), reason="this machine has a CUDA device")
@@ -243,32 +242,30 @@ def test_a_network_learns_on_a_gpu(small, tmp_path):
     assert all(w.device.type == "cpu" and bool(torch.isfinite(w).all()) for w in weights.values())
 
 
-COUNTS = {
-    TrainConfig: ("steps", "batch", "seed", "threads", "patch", "validate_every", "validate_passes"),
-    ReconstructorConfig: ("steps", "batch", "seed", "threads", "patch", "validate_every", "frames_a_step"),
-}
+COUNTS = ("steps", "batch", "seed", "threads", "patch", "validate_every")
+OWN_COUNTS = {"best": "validate_passes", "paper": "validate_passes", "ssml": "frames_a_step"}
 BAD = [
-    *({"steps": 0}, {"batch": 0}, {"mode": None}, {"mode": "worst"}, {"out": 3}, {"out": None}),
-    *({"resume": "no"}, {"resume": None}, {"device": 0}, {"device": "tpu"}, {"device": "cuda:x"}),
+    *({"steps": None}, {"seed": None}, {"steps": 0}, {"batch": 0}, {"mode": None}, {"mode": "worst"}, {"out": 3}),
+    *({"out": None}, {"resume": "no"}, {"resume": None}, {"device": 0}, {"device": "tpu"}, {"device": "cuda:x"}),
 ]
 OWN = {
-    TrainConfig: [{"patch": 97}, {"channels": (8, 8)}, {"channels": (8, 8, 0)}, {"channels": "8 8 8"}],
-    ReconstructorConfig: [{"mode": "best"}, {"patch": 193}, {"width": 13}, {"width": 0}],
+    "best": [{"patch": 97}, {"channels": (8, 8)}, {"channels": (8, 8, 0)}, {"channels": "8 8 8"}, {"start": 3}],
+    "paper": [{"patch": 144}, {"refine": "no"}, {"teacher": "best"}, {"width": 12}],
+    "ssml": [{"patch": 193}, {"width": 13}, {"width": 0}, {"refine": False}, {"start": "best"}],
 }
 
 
-@pytest.mark.parametrize("kind", COUNTS)
-def test_unusable_options_are_named_in_one_line(kind):
-    counts = [{name: n} for name in COUNTS[kind] for n in (-1, 10**30, 1.5, float("nan"), None, True, "8")]
+@pytest.mark.parametrize("mode", OWN)
+def test_unusable_options_are_named_in_one_line(mode):
+    counts = [{name: n} for name in (*COUNTS, OWN_COUNTS[mode]) for n in (-1, 10**30, 1.5, float("nan"), True, "8")]
     amounts = [
         {name: amount}
         for name in ("lr", "minutes", "save_every_s")
         for amount in (0.0, -1.0, float("nan"), float("inf"), 1e308, True, "0.1")
     ]
-    for bad in (*counts, *amounts, *BAD, *OWN[kind]):
-        name = {"mode": "denoiser mode|learned reconstructor"}.get(next(iter(bad)), next(iter(bad)))
-        with pytest.raises(InputError, match=name) as caught:
-            kind(**bad)
+    for bad in (*counts, *amounts, *BAD, *OWN[mode]):
+        with pytest.raises(InputError, match=next(iter(bad))) as caught:
+            TrainConfig(**({"mode": mode} | bad))
         assert "\n" not in str(caught.value), bad
 
 

@@ -102,10 +102,7 @@ DEMO: Work = {
     "spikecam_env.cli.showcase:last_picture": lambda _: _film()[0],
     "spikecam_env.cli.showcase:comparison": lambda _: [{"stream": "noisy"}],
 }
-TRAINING: Work = {
-    "denoiser.training.simulated:Bank.drawn": _bank,
-    "denoiser.training.train_reconstructor:_held_out": lambda _: [],
-}
+TRAINING: Work = {"denoiser.training.simulated:Bank.drawn": _bank}
 EVALUATION: Work = {
     "denoiser.evaluate:evaluate_quick": _result,
     "denoiser.evaluate:report": lambda _: "figures\n" * 200,
