@@ -8,6 +8,7 @@ spikezoo.py     clips in Spike-Zoo's layout, by its protocol: `spikecam evaluate
 truth.py        the truth tests: `spikecam evaluate truth`, of `halves.py`, `fixed_pattern.py` and `quick.py`
 """
 
-from denoiser.evaluate.quick import HELD_OUT_KINDS, PICTURES, evaluate_quick, held_out_textures, report
+from denoiser.evaluate.held_out import HELD_OUT_KINDS, held_out_textures
+from denoiser.evaluate.quick import PICTURES, evaluate_quick, report
 
 __all__ = ["HELD_OUT_KINDS", "PICTURES", "evaluate_quick", "held_out_textures", "report"]

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from denoiser.online import OnlineDnSS, pieces_of
 
-Weights = Mapping[str, str | os.PathLike[str]]
+WeightFiles = Mapping[str, str | os.PathLike[str]]
 """Checkpoint by mode, instead of the shipped ones."""
 
 
@@ -26,7 +26,7 @@ class Restored(NamedTuple):
     """Frames, from the first, that came out before the stream's end was known."""
 
 
-def denoisers(modes: Sequence[str], weights: Weights | None = None) -> dict[str, OnlineDnSS]:
+def denoisers(modes: Sequence[str], weights: WeightFiles | None = None) -> dict[str, OnlineDnSS]:
     """A denoiser of each mode, which gives both spikes and rates; InputError as `OnlineDnSS`."""
     given = weights or {}
     return {
@@ -37,8 +37,8 @@ def denoisers(modes: Sequence[str], weights: Weights | None = None) -> dict[str,
     }
 
 
-def restored(online: OnlineDnSS, spikes: NDArray[np.uint8], title: str = "denoise") -> Restored:
-    """(T, H, W) spikes through a denoiser from its first frame, with a bar of progress."""
+def restored(online: OnlineDnSS, spikes: NDArray[np.uint8], title: str | None = "denoise") -> Restored:
+    """(T, H, W) spikes through a denoiser from its first frame, with a bar of progress unless the title is None."""
     stream = online.another("both")
     fired, rates, whole = np.empty_like(spikes), np.empty(spikes.shape, np.float32), 0
     for whole, piece in pieces_of(stream, spikes, title=title):

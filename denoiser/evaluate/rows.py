@@ -1,4 +1,4 @@
-"""The rows of the tables: rates and spikes from a noisy stream.
+"""The rows of evaluations: rates and spikes from a noisy stream.
 
 A source gives rates or spikes of the judged frames; a decoder makes spikes of rates.  Rows of one source are made in
 one go, so that a network runs once for MUS and accumulation.
@@ -13,7 +13,7 @@ one go, so that a network runs once for MUS and accumulation.
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import lru_cache
 from importlib import resources
@@ -24,22 +24,23 @@ import numpy as np
 
 from denoiser.decoders import accumulate, held, mus
 from denoiser.evaluate import still
-from denoiser.evaluate.exposed import CLASSICAL, ExposedStreams, Planes, StreamCase, film
+from denoiser.evaluate.case import ExposedStreams, Planes, StreamCase
+from denoiser.evaluate.restored import WeightFiles, restored
 from denoiser.ground.plain_torch import read_plain
-from denoiser.online import OnlineDnSS, pieces_of
-from denoiser.weights import load_weights
+from denoiser.networks.reconstructor_recipe import LEARNED
+from denoiser.online import OnlineDnSS
+from denoiser.reconstruct import reconstruct_many
+from denoiser.weights import load_weights, pretrained_path
 from spikecam_env.errors import InputError
 from spikecam_env.types import Spikes
 from spikecam_env.untrusted import existing_file
 
 DECODERS: dict[str, Any] = {"held": held, "mus": mus, "accumulate": accumulate}
-CHUNK = 32
-"""Frames pushed at a time."""
 
 
 @dataclass(frozen=True)
 class Row:
-    """A row of a table."""
+    """A row of an evaluation."""
 
     title: str
     """In the table."""
@@ -48,6 +49,17 @@ class Row:
     """Of the source's rates, "" where it gives spikes."""
     shows_planes: bool = False
     """Its rate planes are judged too."""
+
+
+@dataclass(frozen=True)
+class RowStreams:
+    """A row of a case, made: the judged frames."""
+
+    row: str
+    spikes: Spikes
+    """(T, H, W)."""
+    planes: Planes | None
+    """(T, H, W) rates of which the spikes are made [spikes/frame]; None where there are none, or they are not shown."""
 
 
 ROWS: dict[str, Row] = {
@@ -81,7 +93,7 @@ NETWORKS = {
 }
 """Weights of the sources that are denoisers."""
 PIPELINES = ("tfp41", "ssml", "spk2img-clean", "spk2img-noisy")
-NAMES = (*dict.fromkeys(NETWORKS.values()), *(name for name in PIPELINES if name not in CLASSICAL))
+NAMES = (*dict.fromkeys(NETWORKS.values()), *LEARNED)
 """Of all weights that a table can use."""
 
 
@@ -90,6 +102,17 @@ class Weights:
     """Files of weights by name, instead of those that are shipped."""
 
     files: Mapping[str, Path] = field(default_factory=dict)
+
+    @classmethod
+    def of_modes(cls, modes: Sequence[str], files: WeightFiles | None) -> Weights:
+        """The files by mode; InputError for an unknown mode, and for weights of one that cannot be read."""
+        weights = cls({mode: Path(path) for mode, path in (files or {}).items()})
+        weights.check()
+        for mode in modes:
+            pretrained_path(mode)
+            if why := why_not(mode, weights):
+                raise InputError(why)
+        return weights
 
     @classmethod
     def found(cls, folder: Path | None, files: Mapping[str, Path]) -> Weights:
@@ -113,7 +136,12 @@ class Weights:
     def digest(self, name: str) -> str | None:
         """SHA-256 of the file; None where there is none."""
         path = self.path(name)
-        return _sha256(path, path.stat().st_mtime_ns) if path.is_file() else None
+        return _sha256(*_version(path)) if path.is_file() else None
+
+
+def _version(path: Path) -> tuple[Path, int]:
+    """A file and the time of its last change [ns], by which results from it are kept."""
+    return path, path.stat().st_mtime_ns
 
 
 @lru_cache(maxsize=64)
@@ -125,7 +153,7 @@ def weights_of(source: str) -> str | None:
     """Name of the weights that a source or a picture needs; None where it needs none."""
     if source in NETWORKS:
         return NETWORKS[source]
-    return source if source in PIPELINES and source not in CLASSICAL else None
+    return source if source in LEARNED else None
 
 
 def why_not(source: str, weights: Weights) -> str:
@@ -145,14 +173,16 @@ def why_not(source: str, weights: Weights) -> str:
 
 def streams(
     source: str, rows: list[str], case: StreamCase, exposed: ExposedStreams, weights: Weights
-) -> dict[str, tuple[Spikes, Planes | None]]:
-    """By row of the source: (judged frames, H, W) spikes, and the planes behind them where there are any."""
+) -> list[RowStreams]:
+    """The rows of a source."""
     if source in ("noisy", "clean"):
         whole = exposed.noisy if source == "noisy" else exposed.clean
         assert whole is not None
-        return {row: (exposed.judged(whole), None) for row in rows}
+        return [RowStreams(row, exposed.judged(whole), None) for row in rows]
     planes = _SOURCES[source](case, exposed, weights)
-    return {row: (decoded(planes, ROWS[row].decoder), planes) for row in rows}
+    return [
+        RowStreams(row, decoded(planes, ROWS[row].decoder), planes if ROWS[row].shows_planes else None) for row in rows
+    ]
 
 
 def decoded(planes: Planes, decoder: str) -> Spikes:
@@ -162,45 +192,39 @@ def decoded(planes: Planes, decoder: str) -> Spikes:
 
 
 def denoised(online: OnlineDnSS, exposed: ExposedStreams) -> Planes:
-    """Rate planes of the judged frames; no more frames are pushed than they need."""
-    planes = np.empty((exposed.stop - exposed.first, *exposed.noisy.shape[1:]), np.float32)
-    for first, new in pieces_of(online, exposed.noisy, CHUNK):
-        begin, end = max(first, exposed.first), min(first + len(new), exposed.stop)
-        if end > begin:
-            planes[begin - exposed.first : end - exposed.first] = new[begin - first : end - first]
-        if end == exposed.stop:
-            break
-    return planes
+    """Rate planes of the judged frames; later frames than they need are not pushed."""
+    seen = exposed.noisy[: exposed.stop + online.latency]
+    return restored(online, seen, title=None).rates[exposed.first : exposed.stop]
 
 
 def planes_a_pass(source: str, weights: Weights) -> int:
     """Rate planes that the source's network gives at once; 1 where there is none."""
-    return _passes(weights.path(NETWORKS[source])) if source in NETWORKS else 1
+    return _passes(*_version(weights.path(NETWORKS[source]))) if source in NETWORKS else 1
 
 
 @lru_cache(maxsize=8)
-def _passes(path: Path) -> int:
+def _passes(path: Path, _: int) -> int:
     return load_weights(path)[0].layout.planes
 
 
 def parameters(source: str, weights: Weights) -> int | None:
     """How many weights a source's network has; None for a source without one."""
     name = weights_of(source)
-    return None if name is None else _count(weights.path(name))
+    return None if name is None else _count(*_version(weights.path(name)))
 
 
 @lru_cache(maxsize=16)
-def _count(path: Path) -> int:
+def _count(path: Path, _: int) -> int:
     return sum(tensor.numel() for tensor in read_plain(path)["state_dict"].values())
 
 
 @lru_cache(maxsize=4)
-def _online(path: Path, overlap: bool) -> OnlineDnSS:
+def _online(path: Path, _: int, overlap: bool) -> OnlineDnSS:
     return OnlineDnSS.from_file(path, output="rate", overlap=overlap)
 
 
 def _network(name: str, *, overlap: bool = False) -> Callable[[StreamCase, ExposedStreams, Weights], Planes]:
-    return lambda case, exposed, weights: denoised(_online(weights.path(name), overlap).another(), exposed)
+    return lambda case, exposed, weights: denoised(_online(*_version(weights.path(name)), overlap), exposed)
 
 
 def _calibrated(case: StreamCase, exposed: ExposedStreams, weights: Weights) -> Planes:
@@ -209,8 +233,8 @@ def _calibrated(case: StreamCase, exposed: ExposedStreams, weights: Weights) -> 
 
 
 def _pipeline(name: str) -> Callable[[StreamCase, ExposedStreams, Weights], Planes]:
-    return lambda case, exposed, weights: film(
-        name, exposed.noisy, range(exposed.first, exposed.stop), weights.path(name)
+    return lambda case, exposed, weights: reconstruct_many(
+        name, exposed.noisy, range(exposed.first, exposed.stop), weights=weights.path(name)
     )
 
 

@@ -1,4 +1,4 @@
-"""Scenes in which nothing moves: the held-out collages of `quick`, at rest, well lit.
+"""Scenes in which nothing moves: the collages of `held_out`, at rest, well lit.
 
 Here fixed pattern and texture look the same to a denoiser that does not know its camera; one that takes a calibration
 is given SNEE's, from flats of the same camera.
@@ -7,15 +7,13 @@ is given SNEE's, from flats of the same camera.
 from __future__ import annotations
 
 import tempfile
-from functools import lru_cache
 
 import numpy as np
 
-from denoiser.evaluate.exposed import ExposedStreams, StreamCase
+from denoiser.evaluate.case import ExposedStreams, StreamCase
+from denoiser.evaluate.held_out import held_out_scene
 from denoiser.evaluate.phm import AHEAD
-from denoiser.evaluate.quick import LIGHTS, held_out_textures
 from denoiser.training.pairs import light_in_frame
-from scenes.flat.collage import Collage
 from spikecam_env.calibration import Calibration, calibrate, write_flats
 from spikecam_env.sensor import SensorModel, SpikeSensor
 
@@ -23,9 +21,7 @@ FRAMES = 400
 """Frames whose mean is judged: 10 ms at 40 kHz."""
 SHAPE = (96, 96)
 WELL_LIT = ("bright", "middle")
-"""Of `quick.LIGHTS`."""
-CONTRAST = 6.0
-"""Brightest over darkest light, as in `quick`."""
+"""Of `held_out.LIGHTS`."""
 FLAT_LEVELS = (0.0, 0.1, 0.25, 0.6)
 """Radiance of the flats that SNEE is given; 0 is the dark."""
 FLAT_FRAMES = 10_000
@@ -37,18 +33,10 @@ def still_scenes(a_class: int) -> tuple[str, ...]:
     return tuple(f"{light} {i}" for light in WELL_LIT for i in range(a_class))
 
 
-@lru_cache(maxsize=1)
 def expose(case: StreamCase) -> ExposedStreams:
     """The case's streams; all frames are judged."""
     name, number = case.scene.rsplit(" ", 1)
-    scene = Collage(
-        case.shape,
-        1000 * (WELL_LIT.index(name) + 1) + int(number),
-        speed=0.0,
-        light=LIGHTS[name],
-        contrast=CONTRAST,
-        textures=list(_textures()),
-    )
+    scene = held_out_scene(case.shape, 1000 * (WELL_LIT.index(name) + 1) + int(number), speed=0.0, light=name)
     frames = case.frames + AHEAD
     keys = scene.radiance(0, frames)
     camera = SpikeSensor(SensorModel.preset("scsim"), case.shape, unit_seed(case), engine="auto")
@@ -82,8 +70,3 @@ def calibrated(case: StreamCase) -> Calibration:
             seed=unit_seed(case),
         )
         return calibrate(flats)
-
-
-@lru_cache(maxsize=1)
-def _textures() -> tuple[np.ndarray, ...]:
-    return tuple(held_out_textures(0))
