@@ -25,7 +25,7 @@ from tqdm import tqdm
 
 from denoiser.evaluate.grain import GAP, Picture, elsewhere, kept, relative_grain, two_looks
 from denoiser.evaluate.held_out import held_out_textures
-from denoiser.evaluate.restored import restored
+from denoiser.evaluate.rows import restored
 from denoiser.online import OnlineDnSS
 from denoiser.training.pairs import light_in_frame
 from scenes.flat.sliding import SlidingTexture

@@ -27,8 +27,7 @@ from numpy.typing import NDArray
 from denoiser.evaluate.case import ExposedStreams, ScoredPictures, StreamCase
 from denoiser.evaluate.held_out import LIGHTS, held_out_scene
 from denoiser.evaluate.metrics import gap_closed, psnr_db, ssim
-from denoiser.evaluate.restored import WeightFiles
-from denoiser.evaluate.rows import RowStreams, Weights
+from denoiser.evaluate.rows import RowStreams, WeightFiles, Weights
 from denoiser.evaluate.table_report import number
 from denoiser.evaluate.work import Kind, Results, WorkItem, evaluated, resumed
 from denoiser.training.pairs import light_in_frame

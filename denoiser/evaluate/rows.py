@@ -13,24 +13,25 @@ one go, so that a network runs once for MUS and accumulation.
 from __future__ import annotations
 
 import hashlib
+import os
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
-from functools import lru_cache
+from functools import lru_cache, partial
 from importlib import resources
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from denoiser.decoders import accumulate, held, mus
 from denoiser.evaluate import still
 from denoiser.evaluate.case import ExposedStreams, Planes, StreamCase
-from denoiser.evaluate.restored import WeightFiles, restored
 from denoiser.ground.plain_torch import read_plain
 from denoiser.networks.reconstructor_recipe import LEARNED
-from denoiser.online import OnlineDnSS
+from denoiser.online import OnlineDnSS, pieces_of
 from denoiser.reconstruct import reconstruct_many
-from denoiser.weights import load_weights, pretrained_path
+from denoiser.weights import pretrained_path
 from spikecam_env.errors import InputError
 from spikecam_env.types import Spikes
 from spikecam_env.untrusted import existing_file
@@ -83,18 +84,8 @@ ROWS: dict[str, Row] = {
     "light-mus": Row("true light, MUS", "light", "mus"),
     "light": Row("true light, accumulated", "light", "accumulate"),
 }
-NETWORKS = {
-    "paper": "paper",
-    "paper-no-refine": "paper-no-refine",
-    "best": "best",
-    "fast": "fast",
-    "best-overlap": "best",
-    "best-map": "best",
-}
-"""Weights of the sources that are denoisers."""
-PIPELINES = ("tfp41", "ssml", "spk2img-clean", "spk2img-noisy")
-NAMES = (*dict.fromkeys(NETWORKS.values()), *LEARNED)
-"""Of all weights that a table can use."""
+WeightFiles = Mapping[str, str | os.PathLike[str]]
+"""Checkpoint by mode, instead of the shipped ones."""
 
 
 @dataclass(frozen=True)
@@ -117,7 +108,8 @@ class Weights:
     @classmethod
     def found(cls, folder: Path | None, files: Mapping[str, Path]) -> Weights:
         """The files, and of names that have none NAME.pt in a folder, where it exists."""
-        here = {} if folder is None else {n: folder / f"{n}.pt" for n in NAMES if (folder / f"{n}.pt").is_file()}
+        names = {source.weights for source in SOURCES.values() if source.weights}
+        here = {} if folder is None else {n: folder / f"{n}.pt" for n in names if (folder / f"{n}.pt").is_file()}
         return cls(here | dict(files))
 
     def path(self, name: str) -> Path:
@@ -150,24 +142,21 @@ def _sha256(path: Path, _: int) -> str:
 
 
 def weights_of(source: str) -> str | None:
-    """Name of the weights that a source or a picture needs; None where it needs none."""
-    if source in NETWORKS:
-        return NETWORKS[source]
-    return source if source in LEARNED else None
+    """Name of the weights that a source needs; None where it needs none."""
+    return SOURCES[source].weights if source in SOURCES else None
 
 
 def why_not(source: str, weights: Weights) -> str:
     """Why a source cannot be had, or ""; InputError for a given file that cannot be read."""
     name = weights_of(source)
-    if name is not None and (why := weights.missing(name)):
-        return why
-    if source in NETWORKS:
-        try:
-            planes_a_pass(source, weights)
-        except InputError as error:
-            if name in weights.files:
-                raise
-            return str(error)
+    if name is None or (why := weights.missing(name)):
+        return "" if name is None else why
+    try:
+        planes_a_pass(source, weights)
+    except InputError as error:
+        if name in weights.files:
+            raise
+        return str(error)
     return ""
 
 
@@ -179,7 +168,7 @@ def streams(
         whole = exposed.noisy if source == "noisy" else exposed.clean
         assert whole is not None
         return [RowStreams(row, exposed.judged(whole), None) for row in rows]
-    planes = _SOURCES[source](case, exposed, weights)
+    planes = SOURCES[source].make(case, exposed, weights.path(weights_of(source) or source))
     return [
         RowStreams(row, decoded(planes, ROWS[row].decoder), planes if ROWS[row].shows_planes else None) for row in rows
     ]
@@ -191,20 +180,36 @@ def decoded(planes: Planes, decoder: str) -> Spikes:
     return chosen.step(planes, chosen.start(planes.shape[1:]))[0]  # type: ignore[no-any-return]
 
 
-def denoised(online: OnlineDnSS, exposed: ExposedStreams) -> Planes:
-    """Rate planes of the judged frames; later frames than they need are not pushed."""
-    seen = exposed.noisy[: exposed.stop + online.latency]
-    return restored(online, seen, title=None).rates[exposed.first : exposed.stop]
+class Restored(NamedTuple):
+    """A denoised stream."""
+
+    spikes: NDArray[np.uint8]
+    """(T, H, W)."""
+    rates: NDArray[np.float32]
+    """(T, H, W) [spikes/frame]."""
+    whole: int
+    """Frames, from the first, that came out before the stream's end was known."""
+
+
+def restored(online: OnlineDnSS, spikes: NDArray[np.uint8], title: str | None = None) -> Restored:
+    """(T, H, W) spikes through a denoiser from its first frame; a title has a bar of progress."""
+    stream = online.another("both")
+    fired, rates, whole = np.empty_like(spikes), np.empty(spikes.shape, np.float32), 0
+    for whole, piece in pieces_of(stream, spikes, title=title):
+        part = slice(whole, whole + len(piece[0]))
+        fired[part], rates[part] = piece
+    return Restored(fired, rates, whole)
+
+
+def denoiser(mode: str, weights: Weights) -> OnlineDnSS:
+    """The denoiser of a mode; InputError as `OnlineDnSS`."""
+    return _online(*_version(weights.path(mode)))
 
 
 def planes_a_pass(source: str, weights: Weights) -> int:
     """Rate planes that the source's network gives at once; 1 where there is none."""
-    return _passes(*_version(weights.path(NETWORKS[source]))) if source in NETWORKS else 1
-
-
-@lru_cache(maxsize=8)
-def _passes(path: Path, _: int) -> int:
-    return load_weights(path)[0].layout.planes
+    name = weights_of(source)
+    return 1 if name is None or name in LEARNED else denoiser(name, weights).engine.recipe.layout.planes
 
 
 def parameters(source: str, weights: Weights) -> int | None:
@@ -219,34 +224,48 @@ def _count(path: Path, _: int) -> int:
 
 
 @lru_cache(maxsize=4)
-def _online(path: Path, _: int, overlap: bool) -> OnlineDnSS:
-    return OnlineDnSS.from_file(path, output="rate", overlap=overlap)
+def _online(path: Path, _: int, overlap: bool = False) -> OnlineDnSS:
+    return OnlineDnSS.from_file(path, overlap=overlap)
 
 
-def _network(name: str, *, overlap: bool = False) -> Callable[[StreamCase, ExposedStreams, Weights], Planes]:
-    return lambda case, exposed, weights: denoised(_online(*_version(weights.path(name)), overlap), exposed)
+def _judged_planes(online: OnlineDnSS, exposed: ExposedStreams) -> Planes:
+    """Later frames than the judged ones need are not pushed."""
+    return restored(online, exposed.noisy[: exposed.stop + online.latency]).rates[exposed.first : exposed.stop]
 
 
-def _calibrated(case: StreamCase, exposed: ExposedStreams, weights: Weights) -> Planes:
-    unit = still.calibrated(case)
-    return denoised(OnlineDnSS.from_file(weights.path("best"), output="rate", unit=unit), exposed)
+def _denoised(case: StreamCase, exposed: ExposedStreams, path: Path, *, overlap: bool = False) -> Planes:
+    return _judged_planes(_online(*_version(path), overlap), exposed)
 
 
-def _pipeline(name: str) -> Callable[[StreamCase, ExposedStreams, Weights], Planes]:
-    return lambda case, exposed, weights: reconstruct_many(
-        name, exposed.noisy, range(exposed.first, exposed.stop), weights=weights.path(name)
+def _calibrated(case: StreamCase, exposed: ExposedStreams, path: Path) -> Planes:
+    return _judged_planes(OnlineDnSS.from_file(path, unit=still.calibrated(case)), exposed)
+
+
+def _pipeline(name: str) -> Callable[[StreamCase, ExposedStreams, Path], Planes]:
+    return lambda case, exposed, path: reconstruct_many(
+        name, exposed.noisy, range(exposed.first, exposed.stop), weights=path
     )
 
 
-def _light(case: StreamCase, exposed: ExposedStreams, weights: Weights) -> Planes:
+def _light(case: StreamCase, exposed: ExposedStreams, path: Path) -> Planes:
     assert exposed.light is not None
     return np.ascontiguousarray(exposed.light)
 
 
-_SOURCES: dict[str, Callable[[StreamCase, ExposedStreams, Weights], Planes]] = {
-    **{name: _network(file) for name, file in NETWORKS.items()},
-    "best-overlap": _network("best", overlap=True),
-    "best-map": _calibrated,
-    **{name: _pipeline(name) for name in PIPELINES},
-    "light": _light,
+class Source(NamedTuple):
+    """The planes of some rows."""
+
+    make: Callable[[StreamCase, ExposedStreams, Path], Planes]
+    """(case, its streams, file of weights) -> rates of the judged frames."""
+    weights: str | None = None
+    """Name of those that it needs."""
+
+
+SOURCES = {
+    **{name: Source(_denoised, name) for name in ("paper", "paper-no-refine", "best", "fast")},
+    "best-overlap": Source(partial(_denoised, overlap=True), "best"),
+    "best-map": Source(_calibrated, "best"),
+    **{name: Source(_pipeline(name), name) for name in LEARNED},
+    "tfp41": Source(_pipeline("tfp41")),
+    "light": Source(_light),
 }

@@ -29,8 +29,7 @@ from numpy.typing import NDArray
 
 from denoiser.evaluate.case import ExposedStreams, ScoredPictures, StreamCase
 from denoiser.evaluate.metrics import psnr_db, ssim
-from denoiser.evaluate.restored import WeightFiles
-from denoiser.evaluate.rows import RowStreams, Weights
+from denoiser.evaluate.rows import RowStreams, WeightFiles, Weights
 from denoiser.evaluate.work import Kind, Results, WorkItem, evaluated, resumed
 from spikecam_env.checked import checked_number
 from spikecam_env.datasets.spikezoo import RATE, WHITES, Clip, find_clips, read_clip

@@ -40,17 +40,8 @@ ABLATION = (
     *("clean", "light-held", "light-mus", "light"),
 )
 METHODS = (
-    "noisy",
-    "tfp",
-    "ssml",
-    "spk2img-clean",
-    "spk2img-noisy",
-    "paper-mus",
-    "paper",
-    "fast",
-    "best",
-    "clean",
-    "light",
+    *("noisy", "tfp", "ssml", "spk2img-clean", "spk2img-noisy"),
+    *("paper-mus", "paper", "fast", "best", "clean", "light"),
 )
 REAL_METHODS = METHODS[:-2]
 REAL_ABLATION = ABLATION[:7]

@@ -19,8 +19,7 @@ from denoiser.evaluate import fixed_pattern, halves
 from denoiser.evaluate.case import ScoredPictures
 from denoiser.evaluate.fixed_pattern import evaluate_pattern, evaluate_simulated_pattern
 from denoiser.evaluate.quick import PICTURES, Summary, held_out_tables
-from denoiser.evaluate.restored import WeightFiles, denoisers
-from denoiser.evaluate.rows import Weights
+from denoiser.evaluate.rows import WeightFiles, Weights, denoiser
 from denoiser.evaluate.work import Results, resumed
 from spikecam_env.sensor import SensorModel
 from spikecam_env.streams import read_recording
@@ -60,7 +59,7 @@ def evaluate_truth(
     """
     recordings = {path: read_recording(Path(path)).spikes for path in (static, moving) if path is not None}
     given = Weights.of_modes(modes, weights)
-    online = denoisers(modes, weights)
+    online = {mode: denoiser(mode, given) for mode in modes}
 
     def made(results: Results[ScoredPictures], _: Path | None) -> dict[str, Any]:
         patterns = {} if moving is None else {Path(moving).name: evaluate_pattern(recordings[moving], online)}
