@@ -18,24 +18,20 @@ from __future__ import annotations
 
 import os
 from collections.abc import Iterator, Mapping, Sequence
-from itertools import product
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from denoiser.evaluate.case import ExposedStreams, ScoredPictures, StreamCase
-from denoiser.evaluate.held_out import LIGHTS, held_out_scene
+from denoiser.evaluate.case import ExposedStreams, Planes, ScoredPictures, StreamCase
+from denoiser.evaluate.held_out import LIGHTS, SPEEDS, class_of, expose_moving, moving_scenes
 from denoiser.evaluate.metrics import gap_closed, psnr_db, ssim
 from denoiser.evaluate.rows import RowStreams, WeightFiles, Weights
 from denoiser.evaluate.table_report import number
 from denoiser.evaluate.work import Kind, Results, WorkItem, evaluated, resumed
-from denoiser.training.pairs import light_in_frame
-from spikecam_env.sensor import SensorModel, SpikeSensor
+from spikecam_env.sensor import SensorModel
 from spikecam_env.streams import middleTFI, middleTFP
 
-SPEEDS = {"static": 0.0, "slow": 0.3, "fast": 2.0}
-"""Of the scenes [pixels/frame]."""
 GROUPS: dict[str, tuple[tuple[str, ...], tuple[str, ...]]] = {
     "well lit, moving": (("slow", "fast"), ("bright", "middle")),
     "well lit, static": (("static",), ("bright", "middle")),
@@ -105,8 +101,8 @@ def held_out_tables(
 ) -> dict[str, Any]:
     """The result of `evaluate_quick`; a name of the camera keeps its records apart from those of others."""
     cases = [
-        StreamCase(f"{camera} {speed} {light} {i}".lstrip(), seed, shape, frames, speed=SPEEDS[speed], model=model)
-        for speed, light, i in product(SPEEDS, LIGHTS, range(scenes_a_class))
+        StreamCase(scene, seed, shape, frames, speed=speed, model=model)
+        for scene, speed in moving_scenes(scenes_a_class, camera).items()
     ]
     records = evaluated(HELD_OUT, cases, ("noisy", *modes, "clean", "light"), weights, results)
     scores = [score for record in records for score in _scores(record)]
@@ -153,42 +149,34 @@ def report(result: dict[str, Any]) -> str:
     return f"Mean interval [frames]: {levels}\n\n" + "\n\n".join(tables) + "\n"
 
 
-def _expose(case: StreamCase) -> ExposedStreams:
-    """All frames are judged."""
-    speed, light, number = _class(case.scene)
-    place = list(product(SPEEDS, LIGHTS)).index((speed, light))
-    seed = 1000 * case.seed + 10 * place + number
-    scene = held_out_scene(case.shape, seed, speed=case.speed, light=light, textures_seed=case.seed)
-    keys = scene.radiance(0, case.frames)
-    model = SensorModel.preset("scsim") if case.model is None else case.model
-    camera = SpikeSensor(model, shape=case.shape, seed=seed, engine="reference")
-    truth = np.stack([light_in_frame(keys, t) for t in range(case.frames)])
-    noisy, clean = (s.step(keys, frames=case.frames) for s in (camera, camera.clean_twin()))
-    return ExposedStreams(noisy, clean, truth, 0, case.frames, case.frames // 2, float(truth.max()))
-
-
 def _judged(_: WorkItem[ScoredPictures], made: RowStreams, exposed: ExposedStreams) -> dict[str, Any]:
     """Means over six instants, of pictures of the spikes and of the rate planes."""
     assert exposed.light is not None and exposed.clean is not None
     instants = np.linspace(100, exposed.stop - 40, 6).astype(int)
     peak = float(exposed.light[instants].max())
-    pictures: dict[str, Any] = {}
-    streams: dict[str, NDArray[Any]] = (
-        {"": made.spikes} if made.planes is None else {"": made.spikes, RATE: made.planes}
-    )
-    for source, stream in streams.items():
-        for picture in PICTURES:
-            scores = []
-            for t in instants:
-                truth, clean = exposed.light[t], _picture(exposed.clean, picture, t)
-                seen = _picture(stream, picture, t)
-                against = (f(seen, other, peak) for other in (truth, clean) for f in (psnr_db, ssim))
-                scores.append({**dict(zip(MEASURES, against, strict=True)), "rate": float(truth.mean())})
-            pictures[source + picture] = {name: float(np.mean([s[name] for s in scores])) for name in scores[0]}
+    pictures = {}
+    for picture in PICTURES:
+        for name, stream in {picture: made.spikes, RATE + picture: made.planes}.items():
+            if stream is not None:
+                scores = [
+                    _score(_picture(stream, picture, t), exposed.light[t], _picture(exposed.clean, picture, t), peak)
+                    for t in instants
+                ]
+                pictures[name] = {measure: float(np.mean([s[measure] for s in scores])) for measure in scores[0]}
     return {"pictures": pictures}
 
 
-HELD_OUT = Kind(ScoredPictures, _expose, _judged)
+def _score(seen: Planes, truth: Planes, clean: Planes, peak: float) -> dict[str, float]:
+    return {
+        "light_db": psnr_db(seen, truth, peak),
+        "light_ssim": ssim(seen, truth, peak),
+        "clean_db": psnr_db(seen, clean, peak),
+        "clean_ssim": ssim(seen, clean, peak),
+        "rate": float(truth.mean()),
+    }
+
+
+HELD_OUT = Kind(ScoredPictures, expose_moving, _judged)
 
 
 def _picture(stream: NDArray[Any], kind: str, t: int) -> NDArray[np.float32]:
@@ -200,24 +188,14 @@ def _picture(stream: NDArray[Any], kind: str, t: int) -> NDArray[np.float32]:
     return middleTFI(stream, t) if kind == "TFI" else middleTFP(stream, t, window)
 
 
-def _class(scene: str) -> tuple[str, str, int]:
-    """Speed, light and number of a scene, by its name."""
-    speed, light, number = scene.split()[-3:]
-    return speed, light, int(number)
-
-
 def _scores(record: ScoredPictures) -> Iterator[dict[str, Any]]:
     """The scores of a record, each with its row, picture and class."""
-    speed, light, _ = _class(record.scene)
+    speed, light, _ = class_of(record.scene)
     row = "oracle" if record.row == "light" else record.row
     for name, measures in record.pictures.items():
         picture = name.removeprefix(RATE)
-        yield {
-            "row": row if picture == name else f"{row} rate",
-            "picture": picture,
-            "speed": speed,
-            "light": light,
-        } | measures
+        shown = {"row": row if picture == name else f"{row} rate", "picture": picture}
+        yield {"speed": speed, "light": light, **shown, **measures}
 
 
 def _mean(values: Sequence[float | None]) -> float | None:

@@ -25,8 +25,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from denoiser.decoders import accumulate, held, mus
-from denoiser.evaluate import still
 from denoiser.evaluate.case import ExposedStreams, Planes, StreamCase
+from denoiser.evaluate.held_out import calibrated
 from denoiser.ground.plain_torch import read_plain
 from denoiser.networks.reconstructor_recipe import LEARNED
 from denoiser.online import OnlineDnSS, pieces_of
@@ -238,7 +238,7 @@ def _denoised(case: StreamCase, exposed: ExposedStreams, path: Path, *, overlap:
 
 
 def _calibrated(case: StreamCase, exposed: ExposedStreams, path: Path) -> Planes:
-    return _judged_planes(OnlineDnSS.from_file(path, unit=still.calibrated(case)), exposed)
+    return _judged_planes(OnlineDnSS.from_file(path, unit=calibrated(case)), exposed)
 
 
 def _pipeline(name: str) -> Callable[[StreamCase, ExposedStreams, Path], Planes]:

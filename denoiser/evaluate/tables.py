@@ -20,7 +20,7 @@ from itertools import product
 from pathlib import Path
 from typing import Any
 
-from denoiser.evaluate import phm, real, still
+from denoiser.evaluate import held_out, phm, real
 from denoiser.evaluate.case import ExposedStreams, StreamCase
 from denoiser.evaluate.judge import COLUMNS, RowResult, judged, pictures_of
 from denoiser.evaluate.page import save_pictures, write_page
@@ -68,7 +68,7 @@ def _judged(item: WorkItem[RowResult], made: RowStreams, exposed: ExposedStreams
 
 PHM = Kind(RowResult, phm.expose, _judged)
 REAL = Kind(RowResult, real.expose, _judged)
-STILL = Kind(RowResult, still.expose, _judged)
+STILL = Kind(RowResult, held_out.expose_still, _judged)
 TABLES = {
     "table1": Table("Table 1: PHM_N, pictures against the true light", PHM, METHODS),
     "table2": Table("Table 2: real recordings, NIQE (lower is better)", REAL, REAL_METHODS),
@@ -171,8 +171,11 @@ def _cases(table: Table, request: TableRequest) -> tuple[list[StreamCase], dict[
         return [case for path in paths if path.is_file() for case in real.real_cases(path)], missing
     checked_count(request.seeds, "seeds")
     if table.kind == STILL:
-        shape, frames = checked_shape(request.shape or still.SHAPE), checked_count(request.frames or still.FRAMES)
-        names = still.still_scenes(checked_count(request.still_scenes, "scenes"))
+        shape, frames = (
+            checked_shape(request.shape or held_out.STILL_SHAPE),
+            checked_count(request.frames or held_out.STILL_FRAMES),
+        )
+        names = held_out.still_scenes(checked_count(request.still_scenes, "scenes"))
         return [StreamCase(n, seed, shape, frames, 0.0) for n in names for seed in range(request.seeds)], {}
     if request.data is not None:
         return [case for case in phm.dataset_cases(request.data) if case.scene in request.scenes], {}

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 import torch
 
-from denoiser.evaluate import judge, still, tables, work
+from denoiser.evaluate import held_out, judge, tables, work
 from denoiser.evaluate import rows as row_streams
 from denoiser.evaluate.case import StreamCase
 from denoiser.evaluate.judge import RowResult
@@ -268,8 +268,8 @@ def test_the_spread_is_over_seeds_of_the_mean_over_scenes() -> None:
 def test_the_calibration_of_a_still_scene_is_of_the_camera_before_it() -> None:
     """Against the rates of the same camera before even light: its gain and dark explain nearly all of their spread."""
     case = StreamCase("bright 0", 3, (24, 32), 400)
-    found = PixelMap.of(still.calibrated(case))
-    camera = SpikeSensor(SensorModel.preset("scsim"), case.shape, still.unit_seed(case))
+    found = PixelMap.of(held_out.calibrated(case))
+    camera = SpikeSensor(SensorModel.preset("scsim"), case.shape, held_out.unit_seed(case))
     rate = camera.step(np.full(case.shape, 0.3, np.float32), 4000).mean(axis=0)
     left = np.std(rate - (0.3 * found.gain + found.dark)) / np.std(rate)
     print(f"spread of the rates that the maps leave: {left:.3f}")
