@@ -28,7 +28,7 @@ from denoiser.evaluate.held_out import LIGHTS, SPEEDS, class_of, expose_moving, 
 from denoiser.evaluate.metrics import gap_closed, psnr_db, ssim
 from denoiser.evaluate.rows import RowStreams, WeightFiles, Weights
 from denoiser.evaluate.table_report import number
-from denoiser.evaluate.work import Kind, Results, WorkItem, evaluated, resumed
+from denoiser.evaluate.work import Kind, Results, WorkItem, evaluated, results_in
 from spikecam_env.sensor import SensorModel
 from spikecam_env.streams import middleTFI, middleTFP
 
@@ -78,14 +78,11 @@ def evaluate_quick(
             settings in it.
     """
     given = Weights.of_modes(modes, weights)
-    return resumed(
-        "evaluate",
-        out,
-        {"shape": list(shape), "frames": frames, "model": None if model is None else repr(model)},
-        ScoredPictures,
-        lambda results, _: held_out_tables(modes, given, results, scenes_a_class, shape, frames, seed, model),
-        report,
-    )
+    settings = {"shape": list(shape), "frames": frames, "model": None if model is None else repr(model)}
+    with results_in(out, "evaluate", settings, ScoredPictures) as results:
+        result = held_out_tables(modes, given, results, scenes_a_class, shape, frames, seed, model)
+        results.write(result, report(result))
+    return result
 
 
 def held_out_tables(

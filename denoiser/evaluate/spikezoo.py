@@ -30,7 +30,7 @@ from numpy.typing import NDArray
 from denoiser.evaluate.case import ExposedStreams, ScoredPictures, StreamCase
 from denoiser.evaluate.metrics import psnr_db, ssim
 from denoiser.evaluate.rows import RowStreams, WeightFiles, Weights
-from denoiser.evaluate.work import Kind, Results, WorkItem, evaluated, resumed
+from denoiser.evaluate.work import Kind, WorkItem, evaluated, results_in
 from spikecam_env.checked import checked_number
 from spikecam_env.datasets.spikezoo import RATE, WHITES, Clip, find_clips, read_clip
 from spikecam_env.errors import InputError
@@ -70,21 +70,17 @@ def evaluate_spikezoo(
     rate = checked_number(rate, "rate", *WHITES, unit="spikes/frame")
     given = Weights.of_modes(modes, weights)
     cases = [_case(clip, rate) for clip in find_clips(folder)]
-
-    def made(results: Results[ScoredPictures], _: Path | None) -> dict[str, Any]:
+    settings = {"folder": str(folder), "rate": rate}
+    with results_in(out, "spikezoo", settings, ScoredPictures) as results:
         clips = [
             {"clip": record.scene, "row": f"{record.row} {picture}"}
             | {name: math.inf if value is None else value for name, value in measures.items()}
             for record in evaluated(CLIPS, cases, ("noisy", *modes), given, results)
             for picture, measures in record.pictures.items()
         ]
-        return {
-            "rows": _means(clips),
-            "clips": clips,
-            "settings": {"folder": str(folder), "rate": rate, "modes": list(modes)},
-        }
-
-    return resumed("spikezoo", out, {"folder": str(folder), "rate": rate}, ScoredPictures, made, report)
+        result = {"rows": _means(clips), "clips": clips, "settings": {**settings, "modes": list(modes)}}
+        results.write(result, report(result))
+    return result
 
 
 def score(picture: NDArray[np.floating], truth: NDArray[np.floating], rate: float = RATE) -> dict[str, float]:

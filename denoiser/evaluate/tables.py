@@ -27,7 +27,7 @@ from denoiser.evaluate.page import save_pictures, write_page
 from denoiser.evaluate.rows import ROWS, RowStreams, Weights, parameters, planes_a_pass, why_not
 from denoiser.evaluate.table_report import report
 from denoiser.evaluate.table_summary import groups
-from denoiser.evaluate.work import Kind, Results, WorkItem, evaluated, resumed
+from denoiser.evaluate.work import Kind, WorkItem, evaluated, results_in
 from denoiser.networks.reconstructor_recipe import LEARNED
 from scenes.catalogue import SCENES
 from spikecam_env.checked import checked_count, checked_memory, checked_shape
@@ -137,18 +137,18 @@ def evaluate_table(name: str, request: TableRequest | None = None, *, progress: 
     here = [row for row in rows if row not in missing]
     columns = [column for column in COLUMNS if column not in missing]
     sizes = {row: parameters(ROWS[row].source, request.weights) for row in here}
-
-    def made(results: Results[RowResult], folder: Path | None) -> dict[str, Any]:
-        with nullcontext() if folder is None else made_folder(folder / "pictures", "pictures") as pictures:
+    with results_in(request.out, name, _settings(request), RowResult) as results:
+        folder = nullcontext() if request.out is None else made_folder(request.out / "pictures", "pictures")
+        with folder as pictures:
             records = evaluated(
                 table.kind, cases, here, request.weights, results,
                 columns=columns, jobs=request.jobs, pictures=pictures, progress=progress,
             )  # fmt: skip
-        if folder is not None and pictures is not None:
-            write_page(folder / f"{name}.png", pictures, cases, rows, records)
-        return _result(name, rows, cases, records, missing, sizes)
-
-    return resumed(name, request.out, _settings(request), RowResult, made, report)
+        result = _result(name, rows, cases, records, missing, sizes)
+        results.write(result, report(result))
+        if pictures is not None:
+            write_page(pictures.parent / f"{name}.png", pictures, cases, rows, records)
+    return result
 
 
 def _rows(table: Table, request: TableRequest) -> list[str]:

@@ -20,7 +20,7 @@ from denoiser.evaluate.case import ScoredPictures
 from denoiser.evaluate.fixed_pattern import evaluate_pattern, evaluate_simulated_pattern
 from denoiser.evaluate.quick import PICTURES, Summary, held_out_tables
 from denoiser.evaluate.rows import WeightFiles, Weights, denoiser
-from denoiser.evaluate.work import Results, resumed
+from denoiser.evaluate.work import results_in
 from spikecam_env.sensor import SensorModel
 from spikecam_env.streams import read_recording
 
@@ -60,10 +60,9 @@ def evaluate_truth(
     recordings = {path: read_recording(Path(path)).spikes for path in (static, moving) if path is not None}
     given = Weights.of_modes(modes, weights)
     online = {mode: denoiser(mode, given) for mode in modes}
-
-    def made(results: Results[ScoredPictures], _: Path | None) -> dict[str, Any]:
+    with results_in(out, "truth", {}, ScoredPictures) as results:
         patterns = {} if moving is None else {Path(moving).name: evaluate_pattern(recordings[moving], online)}
-        return {
+        result = {
             "settings": {
                 "static": None if static is None else str(static),
                 "moving": None if moving is None else str(moving),
@@ -78,8 +77,8 @@ def evaluate_truth(
                 for name, model in cameras().items()
             },
         }
-
-    return resumed("truth", out, {}, ScoredPictures, made, report)
+        results.write(result, report(result))
+    return result
 
 
 def cameras() -> dict[str, SensorModel]:

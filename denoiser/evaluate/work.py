@@ -12,6 +12,7 @@ import json
 import math
 import os
 from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
@@ -78,9 +79,9 @@ class Results(Generic[R]):
     records: dict[tuple[Any, ...], R]
 
     @classmethod
-    def opened(cls, path: Path | None, settings: dict[str, Any], record: type[R]) -> Results[R]:
+    def opened(cls, path: Path, settings: dict[str, Any], record: type[R]) -> Results[R]:
         """The records of the file, if it exists; InputError where it is damaged, or of other settings."""
-        if path is None or not path.exists():
+        if not path.exists():
             return cls(path, settings, {})
         head, *lines = read_text(path).rstrip("\n").split("\n")
         found = parse_json(head, str(path))
@@ -101,6 +102,13 @@ class Results(Generic[R]):
             head = json.dumps({"format": FORMAT, **self.settings})
             write_text_whole(self.path, "\n".join([head, *(r.model_dump_json() for r in self.records.values())]) + "\n")
 
+    def write(self, result: dict[str, Any], report: str) -> None:
+        """Write the result as NAME.json and the report as NAME.txt beside the records, where these have a file."""
+        if self.path is not None:
+            text = json.dumps(_plain(result), indent=1, allow_nan=False) + "\n"
+            write_text_whole(self.path.with_suffix(".json"), text)
+            write_text_whole(self.path.with_suffix(".txt"), report)
+
     def has(self, item: WorkItem[R]) -> bool:
         """Whether all rows of the item have a record, of the same weights."""
         found = [self.records.get((*item.key.values(), row)) for row in item.rows]
@@ -108,38 +116,30 @@ class Results(Generic[R]):
         return all(r is not None and r.weights == identity and columns <= set(r.pictures) for r in found)
 
 
-def resumed(
-    name: str,
-    out: str | os.PathLike[str] | None,
-    settings: dict[str, Any],
-    record: type[R],
-    make: Callable[[Results[R], Path | None], dict[str, Any]],
-    report: Callable[[dict[str, Any]], str],
-) -> dict[str, Any]:
-    """The result of an evaluation, which goes on where it was stopped in the same folder.
+@contextmanager
+def results_in(
+    out: str | os.PathLike[str] | None, name: str, settings: dict[str, Any], record: type[R]
+) -> Iterator[Results[R]]:
+    """The results of an evaluation, which goes on where it was stopped in the same folder.
 
     Args:
-        name: of the evaluation: the folder gets NAME.jsonl, its records; NAME.json, the result; NAME.txt, the report.
-        out: the folder, made if needed; None: no files.
+        out: the folder, made if needed, which the evaluation has to itself; None: no files.
+        name: of the evaluation: NAME.jsonl in the folder has the records.
         settings: that all records of a file share; cases and rows can be added to it.
         record: class of the records.
-        make: from the records so far, and the folder, to the result.
-        report: of the result.
 
-    Returns:
-        The result.
+    Yields:
+        The results; its `write` makes the other files.
 
     Raises:
         InputError: another run at work in the folder, or results of other settings in it.
         WriteError: the folder or its files cannot be written.
     """
     if out is None:
-        return make(Results.opened(None, settings, record), None)
-    with run_folder(Path(out), "an evaluation") as folder:
-        result = make(Results.opened(folder / f"{name}.jsonl", settings, record), folder)
-        write_text_whole(folder / f"{name}.json", json.dumps(_plain(result), indent=1, allow_nan=False) + "\n")
-        write_text_whole(folder / f"{name}.txt", report(result))
-    return result
+        yield Results(None, settings, {})
+    else:
+        with run_folder(Path(out), "an evaluation") as folder:
+            yield Results.opened(folder / f"{name}.jsonl", settings, record)
 
 
 def evaluated(

@@ -22,7 +22,7 @@ class Quick:
     """
 
     out: Path | None = None
-    """Folder for evaluate.json and evaluate.txt."""
+    """Folder for evaluate.json, evaluate.txt and evaluate.jsonl; a run that was stopped goes on in it."""
     modes: tuple[Mode, ...] = ("paper", "best")
     """Modes to evaluate."""
     scenes: Annotated[int, WholeRange(1, 1000)] = 2
@@ -50,7 +50,7 @@ class SpikeZoo:
     folder: tyro.conf.Positional[Path]
     """Folder of spike/*.dat and gt/*.png of the same names, or test/ with them.  Pictures say rows and columns."""
     out: Path | None = None
-    """Folder for spikezoo.json and spikezoo.txt."""
+    """Folder for spikezoo.json, spikezoo.txt and spikezoo.jsonl; a run that was stopped goes on in it."""
     modes: tuple[Mode, ...] = ("paper", "best")
     """Modes to evaluate."""
     rate: Positive = 0.6
@@ -79,7 +79,7 @@ class Truth:
     moving: Path | None = None
     """A recording in which everything moves: a pattern that stays is the camera's own."""
     out: Path | None = None
-    """Folder for truth.json and truth.txt."""
+    """Folder for truth.json, truth.txt and truth.jsonl; the held-out scenes in it are not evaluated again."""
     modes: tuple[Mode, ...] = ("paper", "best")
     """Modes to evaluate."""
     scenes: Annotated[int, WholeRange(1, 1000)] = 1
