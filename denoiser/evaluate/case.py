@@ -15,6 +15,8 @@ from spikecam_env.types import Spikes
 from spikecam_env.untrusted import Declared, Name, Seed
 
 Planes = NDArray[np.float32]
+Key = tuple[str, int, float, float, str]
+"""Scene, seed, interval, speed and row."""
 
 
 @dataclass(frozen=True)
@@ -39,6 +41,10 @@ class StreamCase:
     """Of the camera before a held-out scene; default the preset `scsim`."""
     white: float = 1.0
     """Light that is white in a clip's picture [spikes/frame]."""
+
+    def key(self, row: str) -> Key:
+        """Of the record of a row of it."""
+        return self.scene, self.seed, self.interval, self.speed, row
 
 
 @dataclass(frozen=True)
@@ -76,7 +82,7 @@ class CaseRecord(Declared):
     """The scores by name of the picture."""
 
     @property
-    def key(self) -> tuple[str, int, float, float, str]:
+    def key(self) -> Key:
         """The case and the row."""
         return self.scene, self.seed, self.interval, self.speed, self.row
 

@@ -79,8 +79,7 @@ def _caption(case: StreamCase, row: str, column: str, records: Sequence[RowResul
     if row == LIGHT:
         return f"{case.scene}: true light", ""
     title = f"{ROWS[row].title}, {'rate plane' if column == PLANE else COLUMNS[column]}"
-    key = (case.scene, case.seed, case.interval, case.speed, row)
-    score = next((r.pictures.get(column) for r in records if r.key == key), None)
+    score = next((r.pictures.get(column) for r in records if r.key == case.key(row)), None)
     if score is None:
         return title, ""
     if score.niqe is not None:

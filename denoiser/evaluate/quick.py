@@ -98,7 +98,7 @@ def held_out_tables(
 ) -> dict[str, Any]:
     """The result of `evaluate_quick`; a name of the camera keeps its records apart from those of others."""
     cases = [
-        StreamCase(scene, seed, shape, frames, speed=speed, model=model)
+        StreamCase(scene, int(seed), shape, frames, speed=speed, model=model)
         for scene, speed in moving_scenes(scenes_a_class, camera).items()
     ]
     records = evaluated(HELD_OUT, cases, ("noisy", *modes, "clean", "light"), weights, results)

@@ -31,11 +31,12 @@ from denoiser.ground.plain_torch import read_plain
 from denoiser.networks.reconstructor_recipe import LEARNED
 from denoiser.online import OnlineDnSS, pieces_of
 from denoiser.reconstruct import reconstruct_many
-from denoiser.weights import pretrained_path
-from spikecam_env.errors import InputError
+from spikecam_env.errors import InputError, unknown_name
 from spikecam_env.types import Spikes
 from spikecam_env.untrusted import existing_file
 
+MODES = ("best", "fast", "paper")
+"""Denoisers that give spikes and rates of every frame."""
 DECODERS: dict[str, Any] = {"held": held, "mus": mus, "accumulate": accumulate}
 
 
@@ -100,7 +101,8 @@ class Weights:
         weights = cls({mode: Path(path) for mode, path in (files or {}).items()})
         weights.check()
         for mode in modes:
-            pretrained_path(mode)
+            if mode not in MODES:
+                raise unknown_name("denoiser mode", mode, MODES)
             if why := why_not(mode, weights):
                 raise InputError(why)
         return weights
@@ -262,7 +264,7 @@ class Source(NamedTuple):
 
 
 SOURCES = {
-    **{name: Source(_denoised, name) for name in ("paper", "paper-no-refine", "best", "fast")},
+    **{name: Source(_denoised, name) for name in (*MODES, "paper-no-refine")},
     "best-overlap": Source(partial(_denoised, overlap=True), "best"),
     "best-map": Source(_calibrated, "best"),
     **{name: Source(_pipeline(name), name) for name in LEARNED},

@@ -20,7 +20,7 @@ from typing import Any, Generic, TypeVar
 
 from tqdm import tqdm
 
-from denoiser.evaluate.case import CaseRecord, ExposedStreams, StreamCase
+from denoiser.evaluate.case import CaseRecord, ExposedStreams, Key, StreamCase
 from denoiser.evaluate.rows import ROWS, RowStreams, Weights, streams, weights_of
 from denoiser.networks.reconstructor_recipe import LEARNED
 from spikecam_env.errors import InputError, shown
@@ -59,11 +59,6 @@ class WorkItem(Generic[R]):
     pictures: Path | None = None
     """A folder for PNG files of the rows' pictures, or None."""
 
-    @property
-    def key(self) -> dict[str, Any]:
-        """Names of the case in a record."""
-        return {name: getattr(self.case, name) for name in ("scene", "seed", "interval", "speed")}
-
     def identity(self) -> dict[str, str | None]:
         """Digests of the weights behind its rows and pictures, by name."""
         names = [weights_of(self.source), *(c for c in self.columns if c in LEARNED)]
@@ -76,7 +71,7 @@ class Results(Generic[R]):
 
     path: Path | None
     settings: dict[str, Any]
-    records: dict[tuple[Any, ...], R]
+    records: dict[Key, R]
 
     @classmethod
     def opened(cls, path: Path, settings: dict[str, Any], record: type[R]) -> Results[R]:
@@ -111,7 +106,7 @@ class Results(Generic[R]):
 
     def has(self, item: WorkItem[R]) -> bool:
         """Whether all rows of the item have a record, of the same weights."""
-        found = [self.records.get((*item.key.values(), row)) for row in item.rows]
+        found = [self.records.get(item.case.key(row)) for row in item.rows]
         identity, columns = item.identity(), set(item.columns)
         return all(r is not None and r.weights == identity and columns <= set(r.pictures) for r in found)
 
@@ -188,7 +183,7 @@ def evaluated(
         for records in work(todo, jobs):
             results.add(records)
             bar.update()
-    return [results.records[(c.scene, c.seed, c.interval, c.speed, row)] for c in cases for row in rows]
+    return [results.records[case.key(row)] for case in cases for row in rows]
 
 
 def work(todo: Sequence[WorkItem[R]], jobs: int = 1) -> Iterator[list[R]]:
@@ -198,13 +193,12 @@ def work(todo: Sequence[WorkItem[R]], jobs: int = 1) -> Iterator[list[R]]:
 
 def do(item: WorkItem[R]) -> list[R]:
     """One item, done here."""
-    exposed = _exposed(item.kind.expose, item.case)
-    made = streams(item.source, list(item.rows), item.case, exposed, item.weights)
-    identity = item.identity()
-    return [
-        item.kind.record(**item.key, row=row.row, weights=identity, **item.kind.judge(item, row, exposed))
-        for row in made
-    ]
+    case = item.case
+    exposed = _exposed(item.kind.expose, case)
+    made = streams(item.source, list(item.rows), case, exposed, item.weights)
+    of: dict[str, Any] = {name: getattr(case, name) for name in ("scene", "seed", "interval", "speed")}
+    of["weights"] = item.identity()
+    return [item.kind.record(**of, row=row.row, **item.kind.judge(item, row, exposed)) for row in made]
 
 
 @lru_cache(maxsize=1)
