@@ -24,8 +24,8 @@ from numpy.typing import NDArray
 from tqdm import tqdm
 
 from denoiser.evaluate.grain import GAP, Picture, elsewhere, kept, relative_grain, two_looks
-from denoiser.evaluate.quick import held_out_textures
-from denoiser.evaluate.restored import restored
+from denoiser.evaluate.held_out import held_out_textures
+from denoiser.evaluate.rows import restored
 from denoiser.online import OnlineDnSS
 from denoiser.training.pairs import light_in_frame
 from scenes.flat.sliding import SlidingTexture
@@ -163,7 +163,7 @@ def _rows(noisy: Looks, denoised: Mapping[str, Looks], seen: Looks | None = None
 def _mean(rows: list[dict[str, Any]]) -> dict[str, Any]:
     """Means over scenes; errors as of independent ones."""
     mean: dict[str, Any] = {"row": rows[0]["row"]}
-    for name in rows[0].keys() - {"row"}:
+    for name in [name for name in rows[0] if name != "row"]:
         values = np.array([row[name] for row in rows])
         is_error = name.endswith("_error")
         mean[name] = float(np.sqrt(np.square(values).sum()) / len(values) if is_error else values.mean())

@@ -31,7 +31,7 @@ import scipy
 from numpy.typing import NDArray
 
 from denoiser.evaluate.grain import GAP, kept, two_looks
-from denoiser.evaluate.restored import restored
+from denoiser.evaluate.rows import restored
 from denoiser.online import OnlineDnSS
 from spikecam_env.errors import InputError
 

@@ -10,11 +10,13 @@ import numpy as np
 from pydantic import Field
 
 from denoiser.evaluate import measures
-from denoiser.evaluate.exposed import ExposedStreams, Planes, picture
+from denoiser.evaluate.case import CaseRecord, ExposedStreams, Planes
 from denoiser.evaluate.metrics import psnr_db, ssim
 from denoiser.evaluate.niqe import SMALLEST, niqe
+from denoiser.evaluate.rows import RowStreams
+from denoiser.reconstruct import reconstruct
 from spikecam_env.types import Spikes
-from spikecam_env.untrusted import Declared, Name, Seed
+from spikecam_env.untrusted import Declared
 
 COLUMNS = {
     "tfp21": "TFP 21",
@@ -40,16 +42,9 @@ class PictureScore(Declared):
     niqe: float | None = None
 
 
-class RowResult(Declared):
+class RowResult(CaseRecord):
     """The measures of one row of one case; None where a measure has no value."""
 
-    scene: Name
-    seed: Seed
-    interval: float
-    speed: float
-    row: Name
-    weights: dict[str, str | None]
-    """SHA-256 of the weights behind it, by name of the row's source and of the columns."""
     pictures: dict[str, PictureScore]
     """By column, at the middle frame; `plane` is the rate plane."""
     mean_plane: PictureScore | None = None
@@ -69,48 +64,44 @@ class RowResult(Declared):
     last_db: float | None = None
     """Where nothing moves, of the last picture [dB]."""
 
-    @property
-    def key(self) -> tuple[str, int, float, float, str]:
-        """The case and the row."""
-        return self.scene, self.seed, self.interval, self.speed, self.row
-
 
 def display(radiance: Planes, white: float) -> np.ndarray:
     """Light as a screen shows it: (H, W) in [0, 1], gamma 2.2."""
     return np.clip(np.asarray(radiance, np.float64) / white, 0, 1) ** (1 / 2.2)
 
 
-def pictures_of(
-    spikes: Spikes, planes: Planes | None, exposed: ExposedStreams, columns: Mapping[str, Path]
-) -> dict[str, Planes]:
+def pictures_of(made: RowStreams, exposed: ExposedStreams, columns: Mapping[str, Path]) -> dict[str, Planes]:
     """The row's pictures at the middle frame, and its rate plane there, by column.  `columns`: weights of each."""
     middle = exposed.middle - exposed.first
-    shown = {column: picture(column, spikes, middle, weights) for column, weights in columns.items()}
-    return shown if planes is None else shown | {PLANE: planes[middle]}
+    shown = {column: reconstruct(column, made.spikes, middle, weights=weights) for column, weights in columns.items()}
+    return shown if made.planes is None else shown | {PLANE: made.planes[middle]}
 
 
 def judged(
-    shown: dict[str, Planes],
-    spikes: Spikes,
-    planes: Planes | None,
-    exposed: ExposedStreams,
-    passes: int,
-    *,
-    still: bool,
+    shown: Mapping[str, Planes], made: RowStreams, exposed: ExposedStreams, passes: int, *, still: bool
 ) -> dict[str, Any]:
-    """Entries of a `RowResult` but for its key and weights."""
+    """Entries of a `RowResult` but for those of every record.
+
+    Args:
+        shown: of `pictures_of`.
+        made: the row.
+        exposed: the case.
+        passes: rate planes in a pass of the row's network.
+        still: whether nothing moves.
+    """
     if exposed.light is None:
         return {"pictures": {column: _natural(p, exposed.white) for column, p in shown.items()}}
     truth = exposed.light[exposed.middle - exposed.first]
     found: dict[str, Any] = {"pictures": {c: _against(p, truth, exposed.white) for c, p in shown.items()}}
-    rates = spikes if planes is None else planes
+    planes = made.planes
+    rates = made.spikes if planes is None else planes
     found |= {
         "bias": plain(measures.bias(rates, exposed.light)),
         "lag": plain(measures.lag_frames(rates, exposed.light)),
     }
     if planes is not None:
         found |= _of_planes(planes, exposed, passes)
-    return found | (_at_rest(spikes, planes, truth, exposed.white) if still else {})
+    return found | (_at_rest(made.spikes, planes, truth, exposed.white) if still else {})
 
 
 def plain(value: float) -> float | None:

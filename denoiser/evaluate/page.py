@@ -1,17 +1,17 @@
-"""The picture page of a table: one strip a scene, of the rows' pictures, noisy to light."""
+"""The pictures of a table as files, and their page: one strip a scene, of the rows' pictures, noisy to light."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
+import numpy as np
 from matplotlib import font_manager
 from PIL import Image, ImageDraw, ImageFont
 
-from denoiser.evaluate.exposed import StreamCase
-from denoiser.evaluate.judge import COLUMNS, PLANE, RowResult
+from denoiser.evaluate.case import ExposedStreams, Planes, StreamCase
+from denoiser.evaluate.judge import COLUMNS, PLANE, RowResult, display
 from denoiser.evaluate.rows import ROWS
-from denoiser.evaluate.work import LIGHT, picture_path
 from spikecam_env.whole import whole_file
 
 BACKGROUND, INK, FAINT = (16, 18, 22), (235, 238, 242), (150, 158, 170)
@@ -20,7 +20,20 @@ WIDE = 260
 """Columns of a picture on the page."""
 COLUMN = "tfp21"
 """Under which spikes are shown: it needs no network, and blurs less than TFP 41."""
+LIGHT = "light"
+"""Name of the picture of the true light."""
 STRIP = ("noisy", "paper-mus", "paper", "best", "clean")
+
+
+def save_pictures(
+    folder: Path, case: StreamCase, row: str, shown: Mapping[str, Planes], exposed: ExposedStreams
+) -> None:
+    """Pictures of a row by column, and the true light where it is known, as PNG files."""
+    for column, found in shown.items():
+        _save(_file(folder, case, row, column), display(found, exposed.white))
+    if exposed.light is not None:
+        truth = exposed.light[exposed.middle - exposed.first]
+        _save(_file(folder, case, LIGHT, LIGHT), display(truth, exposed.white))
 
 
 def write_page(
@@ -46,7 +59,7 @@ def _strip(folder: Path, case: StreamCase, rows: Sequence[str], records: Sequenc
     panels = [(row, COLUMN) for row in STRIP if row in rows]
     panels += [(row, PLANE) for row in rows if ROWS[row].shows_planes]
     panels.append((LIGHT, LIGHT))
-    shown = [(row, column, picture_path(folder, case, row, column)) for row, column in panels]
+    shown = [(row, column, _file(folder, case, row, column)) for row, column in panels]
     pictures = [(row, column, Image.open(path)) for row, column, path in shown if path.is_file()]
     if not pictures:
         return None
@@ -66,8 +79,7 @@ def _caption(case: StreamCase, row: str, column: str, records: Sequence[RowResul
     if row == LIGHT:
         return f"{case.scene}: true light", ""
     title = f"{ROWS[row].title}, {'rate plane' if column == PLANE else COLUMNS[column]}"
-    key = (case.scene, case.seed, case.interval, case.speed, row)
-    score = next((r.pictures.get(column) for r in records if r.key == key), None)
+    score = next((r.pictures.get(column) for r in records if r.key == case.key(row)), None)
     if score is None:
         return title, ""
     if score.niqe is not None:
@@ -77,3 +89,12 @@ def _caption(case: StreamCase, row: str, column: str, records: Sequence[RowResul
 
 def _font(size: int) -> ImageFont.FreeTypeFont:
     return ImageFont.truetype(font_manager.findfont("DejaVu Sans"), size)
+
+
+def _file(folder: Path, case: StreamCase, row: str, column: str) -> Path:
+    return folder / f"{case.scene.replace(' ', '-')}-{row}-{column}.png"
+
+
+def _save(path: Path, shown: np.ndarray) -> None:
+    with whole_file(path) as beside:
+        Image.fromarray((255 * shown + 0.5).astype(np.uint8)).save(beside)

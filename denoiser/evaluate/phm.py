@@ -8,12 +8,11 @@ Seed 0 is the camera of the dataset with seed 0; other seeds are other cameras b
 
 from __future__ import annotations
 
-from functools import lru_cache
 from pathlib import Path
 
 import numpy as np
 
-from denoiser.evaluate.exposed import ExposedStreams, StreamCase
+from denoiser.evaluate.case import ExposedStreams, StreamCase
 from denoiser.training.pairs import light_in_frame
 from scenes.catalogue import make_scene
 from scenes.derived.faster import at_speed
@@ -61,7 +60,6 @@ def dataset_cases(folder: str | Path) -> list[StreamCase]:
             raise InputError(f"{folder} has no whole {file['path']}; run `spikecam dataset` again to make it")
     return [
         StreamCase(
-            "phm",
             Path(file["path"]).stem,
             file["scene_seed"],
             (rows, columns),
@@ -73,9 +71,8 @@ def dataset_cases(folder: str | Path) -> list[StreamCase]:
     ]
 
 
-@lru_cache(maxsize=1)
 def expose(case: StreamCase) -> ExposedStreams:
-    """The case's streams and light; the last one is kept."""
+    """The case's streams and light."""
     middle = case.frames // 2
     around = min(reach(case.interval), middle)
     first, stop = middle - around, min(middle + around + 1, case.frames)

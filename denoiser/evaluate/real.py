@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 import spikecam_env
-from denoiser.evaluate.exposed import ExposedStreams, StreamCase
+from denoiser.evaluate.case import ExposedStreams, StreamCase
 from denoiser.evaluate.phm import AHEAD, reach
 from spikecam_env.streams import read_recording
 
@@ -27,9 +27,7 @@ def real_cases(path: Path) -> list[StreamCase]:
     spikes = _spikes(path)
     interval = round(1 / max(float(spikes.mean()), 1e-6), 1)
     shape = (spikes.shape[1], spikes.shape[2])
-    return [
-        StreamCase("real", path.name, i, shape, len(spikes), interval, folder=str(path.parent)) for i in range(INSTANTS)
-    ]
+    return [StreamCase(path.name, i, shape, len(spikes), interval, folder=str(path.parent)) for i in range(INSTANTS)]
 
 
 def expose(case: StreamCase) -> ExposedStreams:

@@ -1,4 +1,4 @@
-"""The rows of the tables: rates and spikes from a noisy stream.
+"""The rows of evaluations: rates and spikes from a noisy stream.
 
 A source gives rates or spikes of the judged frames; a decoder makes spikes of rates.  Rows of one source are made in
 one go, so that a network runs once for MUS and accumulation.
@@ -13,33 +13,36 @@ one go, so that a network runs once for MUS and accumulation.
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Callable, Mapping
+import os
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
-from functools import lru_cache
+from functools import lru_cache, partial
 from importlib import resources
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from denoiser.decoders import accumulate, held, mus
-from denoiser.evaluate import still
-from denoiser.evaluate.exposed import CLASSICAL, ExposedStreams, Planes, StreamCase, film
+from denoiser.evaluate.case import ExposedStreams, Planes, StreamCase
+from denoiser.evaluate.held_out import calibrated
 from denoiser.ground.plain_torch import read_plain
+from denoiser.networks.reconstructor_recipe import LEARNED
 from denoiser.online import OnlineDnSS, pieces_of
-from denoiser.weights import load_weights
-from spikecam_env.errors import InputError
+from denoiser.reconstruct import reconstruct_many
+from spikecam_env.errors import InputError, unknown_name
 from spikecam_env.types import Spikes
 from spikecam_env.untrusted import existing_file
 
+MODES = ("best", "fast", "paper")
+"""Denoisers that give spikes and rates of every frame."""
 DECODERS: dict[str, Any] = {"held": held, "mus": mus, "accumulate": accumulate}
-CHUNK = 32
-"""Frames pushed at a time."""
 
 
 @dataclass(frozen=True)
 class Row:
-    """A row of a table."""
+    """A row of an evaluation."""
 
     title: str
     """In the table."""
@@ -48,6 +51,17 @@ class Row:
     """Of the source's rates, "" where it gives spikes."""
     shows_planes: bool = False
     """Its rate planes are judged too."""
+
+
+@dataclass(frozen=True)
+class RowStreams:
+    """A row of a case, made: the judged frames."""
+
+    row: str
+    spikes: Spikes
+    """(T, H, W)."""
+    planes: Planes | None
+    """(T, H, W) rates of which the spikes are made [spikes/frame]; None where there are none, or they are not shown."""
 
 
 ROWS: dict[str, Row] = {
@@ -71,18 +85,8 @@ ROWS: dict[str, Row] = {
     "light-mus": Row("true light, MUS", "light", "mus"),
     "light": Row("true light, accumulated", "light", "accumulate"),
 }
-NETWORKS = {
-    "paper": "paper",
-    "paper-no-refine": "paper-no-refine",
-    "best": "best",
-    "fast": "fast",
-    "best-overlap": "best",
-    "best-map": "best",
-}
-"""Weights of the sources that are denoisers."""
-PIPELINES = ("tfp41", "ssml", "spk2img-clean", "spk2img-noisy")
-NAMES = (*dict.fromkeys(NETWORKS.values()), *(name for name in PIPELINES if name not in CLASSICAL))
-"""Of all weights that a table can use."""
+WeightFiles = Mapping[str, str | os.PathLike[str]]
+"""Checkpoint by mode, instead of the shipped ones."""
 
 
 @dataclass(frozen=True)
@@ -92,9 +96,22 @@ class Weights:
     files: Mapping[str, Path] = field(default_factory=dict)
 
     @classmethod
+    def of_modes(cls, modes: Sequence[str], files: WeightFiles | None) -> Weights:
+        """The files by mode; InputError for an unknown mode, and for weights of one that cannot be read."""
+        weights = cls({mode: Path(path) for mode, path in (files or {}).items()})
+        weights.check()
+        for mode in modes:
+            if mode not in MODES:
+                raise unknown_name("denoiser mode", mode, MODES)
+            if why := why_not(mode, weights):
+                raise InputError(why)
+        return weights
+
+    @classmethod
     def found(cls, folder: Path | None, files: Mapping[str, Path]) -> Weights:
         """The files, and of names that have none NAME.pt in a folder, where it exists."""
-        here = {} if folder is None else {n: folder / f"{n}.pt" for n in NAMES if (folder / f"{n}.pt").is_file()}
+        names = {source.weights for source in SOURCES.values() if source.weights}
+        here = {} if folder is None else {n: folder / f"{n}.pt" for n in names if (folder / f"{n}.pt").is_file()}
         return cls(here | dict(files))
 
     def path(self, name: str) -> Path:
@@ -113,7 +130,12 @@ class Weights:
     def digest(self, name: str) -> str | None:
         """SHA-256 of the file; None where there is none."""
         path = self.path(name)
-        return _sha256(path, path.stat().st_mtime_ns) if path.is_file() else None
+        return _sha256(*_version(path)) if path.is_file() else None
+
+
+def _version(path: Path) -> tuple[Path, int]:
+    """A file and the time of its last change [ns], by which results from it are kept."""
+    return path, path.stat().st_mtime_ns
 
 
 @lru_cache(maxsize=64)
@@ -122,37 +144,36 @@ def _sha256(path: Path, _: int) -> str:
 
 
 def weights_of(source: str) -> str | None:
-    """Name of the weights that a source or a picture needs; None where it needs none."""
-    if source in NETWORKS:
-        return NETWORKS[source]
-    return source if source in PIPELINES and source not in CLASSICAL else None
+    """Name of the weights that a source needs; None where it needs none."""
+    return SOURCES[source].weights if source in SOURCES else None
 
 
 def why_not(source: str, weights: Weights) -> str:
     """Why a source cannot be had, or ""; InputError for a given file that cannot be read."""
     name = weights_of(source)
-    if name is not None and (why := weights.missing(name)):
-        return why
-    if source in NETWORKS:
-        try:
-            planes_a_pass(source, weights)
-        except InputError as error:
-            if name in weights.files:
-                raise
-            return str(error)
+    if name is None or (why := weights.missing(name)):
+        return "" if name is None else why
+    try:
+        planes_a_pass(source, weights)
+    except InputError as error:
+        if name in weights.files:
+            raise
+        return str(error)
     return ""
 
 
 def streams(
     source: str, rows: list[str], case: StreamCase, exposed: ExposedStreams, weights: Weights
-) -> dict[str, tuple[Spikes, Planes | None]]:
-    """By row of the source: (judged frames, H, W) spikes, and the planes behind them where there are any."""
+) -> list[RowStreams]:
+    """The rows of a source."""
     if source in ("noisy", "clean"):
         whole = exposed.noisy if source == "noisy" else exposed.clean
         assert whole is not None
-        return {row: (exposed.judged(whole), None) for row in rows}
-    planes = _SOURCES[source](case, exposed, weights)
-    return {row: (decoded(planes, ROWS[row].decoder), planes) for row in rows}
+        return [RowStreams(row, exposed.judged(whole), None) for row in rows]
+    planes = SOURCES[source].make(case, exposed, weights.path(weights_of(source) or source))
+    return [
+        RowStreams(row, decoded(planes, ROWS[row].decoder), planes if ROWS[row].shows_planes else None) for row in rows
+    ]
 
 
 def decoded(planes: Planes, decoder: str) -> Spikes:
@@ -161,68 +182,92 @@ def decoded(planes: Planes, decoder: str) -> Spikes:
     return chosen.step(planes, chosen.start(planes.shape[1:]))[0]  # type: ignore[no-any-return]
 
 
-def denoised(online: OnlineDnSS, exposed: ExposedStreams) -> Planes:
-    """Rate planes of the judged frames; no more frames are pushed than they need."""
-    planes = np.empty((exposed.stop - exposed.first, *exposed.noisy.shape[1:]), np.float32)
-    for first, new in pieces_of(online, exposed.noisy, CHUNK):
-        begin, end = max(first, exposed.first), min(first + len(new), exposed.stop)
-        if end > begin:
-            planes[begin - exposed.first : end - exposed.first] = new[begin - first : end - first]
-        if end == exposed.stop:
-            break
-    return planes
+class Restored(NamedTuple):
+    """A denoised stream."""
+
+    spikes: NDArray[np.uint8]
+    """(T, H, W)."""
+    rates: NDArray[np.float32]
+    """(T, H, W) [spikes/frame]."""
+    whole: int
+    """Frames, from the first, that came out before the stream's end was known."""
+
+
+def restored(online: OnlineDnSS, spikes: NDArray[np.uint8], title: str | None = None) -> Restored:
+    """(T, H, W) spikes through a denoiser from its first frame; a title has a bar of progress."""
+    stream = online.another("both")
+    fired, rates, whole = np.empty_like(spikes), np.empty(spikes.shape, np.float32), 0
+    for whole, piece in pieces_of(stream, spikes, title=title):
+        part = slice(whole, whole + len(piece[0]))
+        fired[part], rates[part] = piece
+    return Restored(fired, rates, whole)
+
+
+def denoiser(mode: str, weights: Weights) -> OnlineDnSS:
+    """The denoiser of a mode; InputError as `OnlineDnSS`."""
+    return _online(*_version(weights.path(mode)))
 
 
 def planes_a_pass(source: str, weights: Weights) -> int:
     """Rate planes that the source's network gives at once; 1 where there is none."""
-    return _passes(weights.path(NETWORKS[source])) if source in NETWORKS else 1
-
-
-@lru_cache(maxsize=8)
-def _passes(path: Path) -> int:
-    return load_weights(path)[0].layout.planes
+    name = weights_of(source)
+    return 1 if name is None or name in LEARNED else denoiser(name, weights).engine.recipe.layout.planes
 
 
 def parameters(source: str, weights: Weights) -> int | None:
     """How many weights a source's network has; None for a source without one."""
     name = weights_of(source)
-    return None if name is None else _count(weights.path(name))
+    return None if name is None else _count(*_version(weights.path(name)))
 
 
 @lru_cache(maxsize=16)
-def _count(path: Path) -> int:
+def _count(path: Path, _: int) -> int:
     return sum(tensor.numel() for tensor in read_plain(path)["state_dict"].values())
 
 
 @lru_cache(maxsize=4)
-def _online(path: Path, overlap: bool) -> OnlineDnSS:
-    return OnlineDnSS.from_file(path, output="rate", overlap=overlap)
+def _online(path: Path, _: int, overlap: bool = False) -> OnlineDnSS:
+    return OnlineDnSS.from_file(path, overlap=overlap)
 
 
-def _network(name: str, *, overlap: bool = False) -> Callable[[StreamCase, ExposedStreams, Weights], Planes]:
-    return lambda case, exposed, weights: denoised(_online(weights.path(name), overlap).another(), exposed)
+def _judged_planes(online: OnlineDnSS, exposed: ExposedStreams) -> Planes:
+    """Later frames than the judged ones need are not pushed."""
+    return restored(online, exposed.noisy[: exposed.stop + online.latency]).rates[exposed.first : exposed.stop]
 
 
-def _calibrated(case: StreamCase, exposed: ExposedStreams, weights: Weights) -> Planes:
-    unit = still.calibrated(case)
-    return denoised(OnlineDnSS.from_file(weights.path("best"), output="rate", unit=unit), exposed)
+def _denoised(case: StreamCase, exposed: ExposedStreams, path: Path, *, overlap: bool = False) -> Planes:
+    return _judged_planes(_online(*_version(path), overlap), exposed)
 
 
-def _pipeline(name: str) -> Callable[[StreamCase, ExposedStreams, Weights], Planes]:
-    return lambda case, exposed, weights: film(
-        name, exposed.noisy, range(exposed.first, exposed.stop), weights.path(name)
+def _calibrated(case: StreamCase, exposed: ExposedStreams, path: Path) -> Planes:
+    return _judged_planes(OnlineDnSS.from_file(path, unit=calibrated(case)), exposed)
+
+
+def _pipeline(name: str) -> Callable[[StreamCase, ExposedStreams, Path], Planes]:
+    return lambda case, exposed, path: reconstruct_many(
+        name, exposed.noisy, range(exposed.first, exposed.stop), weights=path
     )
 
 
-def _light(case: StreamCase, exposed: ExposedStreams, weights: Weights) -> Planes:
+def _light(case: StreamCase, exposed: ExposedStreams, path: Path) -> Planes:
     assert exposed.light is not None
     return np.ascontiguousarray(exposed.light)
 
 
-_SOURCES: dict[str, Callable[[StreamCase, ExposedStreams, Weights], Planes]] = {
-    **{name: _network(file) for name, file in NETWORKS.items()},
-    "best-overlap": _network("best", overlap=True),
-    "best-map": _calibrated,
-    **{name: _pipeline(name) for name in PIPELINES},
-    "light": _light,
+class Source(NamedTuple):
+    """The planes of some rows."""
+
+    make: Callable[[StreamCase, ExposedStreams, Path], Planes]
+    """(case, its streams, file of weights) -> rates of the judged frames."""
+    weights: str | None = None
+    """Name of those that it needs."""
+
+
+SOURCES = {
+    **{name: Source(_denoised, name) for name in (*MODES, "paper-no-refine")},
+    "best-overlap": Source(partial(_denoised, overlap=True), "best"),
+    "best-map": Source(_calibrated, "best"),
+    **{name: Source(_pipeline(name), name) for name in LEARNED},
+    "tfp41": Source(_pipeline("tfp41")),
+    "light": Source(_light),
 }

@@ -18,18 +18,21 @@ Source: K. Chen et al., https://github.com/chenkang455/Spike-Zoo (v0.2.3): `metr
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+import math
+import os
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from tqdm import tqdm
 
+from denoiser.evaluate.case import ExposedStreams, ScoredPictures, StreamCase
 from denoiser.evaluate.metrics import psnr_db, ssim
-from denoiser.evaluate.restored import Weights, denoisers, restored
+from denoiser.evaluate.rows import RowStreams, WeightFiles, Weights
+from denoiser.evaluate.work import Kind, WorkItem, evaluated, results_in
 from spikecam_env.checked import checked_number
-from spikecam_env.datasets.spikezoo import RATE, WHITES, find_clips, read_clip
+from spikecam_env.datasets.spikezoo import RATE, WHITES, Clip, find_clips, read_clip
 from spikecam_env.errors import InputError
 from spikecam_env.streams import middleTFP
 
@@ -42,8 +45,9 @@ def evaluate_spikezoo(
     folder: str | Path,
     modes: Sequence[str] = ("paper", "best"),
     *,
-    weights: Weights | None = None,
+    weights: WeightFiles | None = None,
     rate: float = RATE,
+    out: str | os.PathLike[str] | None = None,
 ) -> dict[str, Any]:
     """Evaluate on the clips of a folder.
 
@@ -52,29 +56,31 @@ def evaluate_spikezoo(
         modes: denoisers to judge.
         weights: checkpoint by mode, instead of the shipped ones.
         rate: light [spikes/frame] of white; spikes and rate planes are divided by it.
+        out: a folder for `spikezoo.json`, `spikezoo.txt` and the records, `spikezoo.jsonl`; a run that was stopped goes
+            on in it.
 
     Returns:
         "rows": per row (noisy and each mode, by TFP, TFI and, for modes, the rate plane) the mean of `MEASURES` over
         the clips and its spread; "clips": the same of each clip; "settings".
 
     Raises:
-        InputError: a folder of another layout, a clip of fewer than 41 frames, and weights that do not load.
+        InputError: a folder of another layout, a clip of fewer than 41 frames, weights that do not load; another run at
+            work in `out`, or results of other settings in it.
     """
     rate = checked_number(rate, "rate", *WHITES, unit="spikes/frame")
-    online = denoisers(modes, weights)
-    scores: list[dict[str, Any]] = []
-    for clip in tqdm(find_clips(folder), desc="evaluate", unit="clip", leave=False):
-        spikes, truth = read_clip(clip)
-        middle = len(spikes) // 2
-        if not REACH <= middle < len(spikes) - REACH:
-            raise InputError(f"{clip.spikes} holds {len(spikes)} frames; its pictures take {2 * REACH + 1}")
-        for row, picture in _pictures(spikes, middle, online):
-            scores.append({"clip": clip.name, "row": row, **score(picture, truth, rate)})
-    return {
-        "rows": _means(scores),
-        "clips": scores,
-        "settings": {"folder": str(folder), "rate": rate, "modes": list(modes)},
-    }
+    given = Weights.of_modes(modes, weights)
+    cases = [_case(clip, rate) for clip in find_clips(folder)]
+    settings = {"folder": str(folder), "rate": rate}
+    with results_in(out, "spikezoo", settings, ScoredPictures) as results:
+        clips = [
+            {"clip": record.scene, "row": f"{record.row} {picture}"}
+            | {name: math.inf if value is None else value for name, value in measures.items()}
+            for record in evaluated(CLIPS, cases, ("noisy", *modes), given, results)
+            for picture, measures in record.pictures.items()
+        ]
+        result = {"rows": _means(clips), "clips": clips, "settings": {**settings, "modes": list(modes)}}
+        results.write(result, report(result))
+    return result
 
 
 def score(picture: NDArray[np.floating], truth: NDArray[np.floating], rate: float = RATE) -> dict[str, float]:
@@ -107,18 +113,34 @@ def report(result: dict[str, Any]) -> str:
     return "\n".join([*lines, f"{clips} clips; +-: spread over them; white is {result['settings']['rate']:g}"]) + "\n"
 
 
-def _pictures(
-    spikes: NDArray[np.uint8], middle: int, online: dict[str, Any]
-) -> Iterator[tuple[str, NDArray[np.floating]]]:
-    """Rows and their pictures [spikes/frame]."""
-    yield "noisy TFP", middleTFP(spikes, middle, 2 * REACH + 1)
-    yield "noisy TFI", interval_picture(spikes, middle)
-    for mode, denoiser in online.items():
-        needed = spikes[: middle + REACH + 1 + denoiser.latency]  # later frames change nothing in these pictures
-        denoised = restored(denoiser, needed, mode)
-        yield f"{mode} TFP", middleTFP(denoised.spikes, middle, 2 * REACH + 1)
-        yield f"{mode} TFI", interval_picture(denoised.spikes, middle)
-        yield f"{mode} rate", denoised.rates[middle]
+def _case(clip: Clip, rate: float) -> StreamCase:
+    """Its stream and picture are read when it is exposed: the file says how large they are."""
+    return StreamCase(clip.name, 0, (0, 0), 0, folder=str(clip.spikes.parent.parent), white=rate)
+
+
+def _expose(case: StreamCase) -> ExposedStreams:
+    """The frames up to the last of the pictures are judged; the light is the one picture."""
+    folder = Path(case.folder)
+    clip = Clip(case.scene, folder / "spike" / f"{case.scene}.dat", folder / "gt" / f"{case.scene}.png")
+    spikes, truth = read_clip(clip)
+    middle = len(spikes) // 2
+    if not REACH <= middle < len(spikes) - REACH:
+        raise InputError(f"{clip.spikes} holds {len(spikes)} frames; its pictures take {2 * REACH + 1}")
+    return ExposedStreams(spikes, None, truth[None], 0, middle + REACH + 1, middle, case.white)
+
+
+def _judged(_: WorkItem[ScoredPictures], made: RowStreams, exposed: ExposedStreams) -> dict[str, Any]:
+    assert exposed.light is not None
+    pictures: dict[str, NDArray[np.floating]] = {
+        "TFP": middleTFP(made.spikes, exposed.middle, 2 * REACH + 1),
+        "TFI": interval_picture(made.spikes, exposed.middle),
+    }
+    if made.planes is not None:
+        pictures["rate"] = made.planes[exposed.middle]
+    return {"pictures": {name: score(p, exposed.light[0], exposed.white) for name, p in pictures.items()}}
+
+
+CLIPS = Kind(ScoredPictures, _expose, _judged)
 
 
 def _means(scores: list[dict[str, Any]]) -> list[dict[str, Any]]:
@@ -126,6 +148,7 @@ def _means(scores: list[dict[str, Any]]) -> list[dict[str, Any]]:
     for row in dict.fromkeys(s["row"] for s in scores):
         taken = [s for s in scores if s["row"] == row]
         means = {name: float(np.mean([s[name] for s in taken])) for name in MEASURES}
-        spreads = {f"{name} spread": float(np.std([s[name] for s in taken])) for name in MEASURES}
+        with np.errstate(invalid="ignore"):  # a picture without error is infinitely good
+            spreads = {f"{name} spread": float(np.std([s[name] for s in taken])) for name in MEASURES}
         rows.append({"row": row, **means, **spreads})
     return rows

@@ -7,7 +7,6 @@ from typing import Any
 
 from denoiser.evaluate.judge import COLUMNS, PLANE
 from denoiser.evaluate.rows import ROWS
-from denoiser.evaluate.writing import number
 
 WIDTH = 41
 """Of the column of rows: the longest title with the size of its network."""
@@ -22,6 +21,11 @@ def report(result: dict[str, Any]) -> str:
     if result["missing"]:
         parts.append("not there:\n" + "\n".join(f"  {name}: {why}" for name, why in result["missing"].items()))
     return "\n\n".join(parts) + "\n"
+
+
+def number(value: float | None, width: int, digits: int) -> str:
+    """A cell of a printed table."""
+    return f"{'-':>{width}}" if value is None else f"{value:{width}.{digits}f}"
 
 
 def _of(settings: dict[str, Any]) -> str:

@@ -14,27 +14,25 @@ A table that was stopped goes on where it was, in the same folder.
 
 from __future__ import annotations
 
-import json
+from contextlib import nullcontext
 from dataclasses import dataclass, field
 from itertools import product
 from pathlib import Path
 from typing import Any
 
-from tqdm import tqdm
-
-from denoiser.evaluate import phm, real, still
-from denoiser.evaluate.exposed import CLASSICAL, StreamCase
-from denoiser.evaluate.judge import COLUMNS, RowResult
-from denoiser.evaluate.page import write_page
-from denoiser.evaluate.rows import ROWS, Weights, parameters, why_not
+from denoiser.evaluate import held_out, phm, real
+from denoiser.evaluate.case import ExposedStreams, StreamCase
+from denoiser.evaluate.judge import COLUMNS, RowResult, judged, pictures_of
+from denoiser.evaluate.page import save_pictures, write_page
+from denoiser.evaluate.rows import ROWS, RowStreams, Weights, parameters, planes_a_pass, why_not
 from denoiser.evaluate.table_report import report
 from denoiser.evaluate.table_summary import groups
-from denoiser.evaluate.work import Results, tasks, undone, work
+from denoiser.evaluate.work import Kind, WorkItem, evaluated, results_in
+from denoiser.networks.reconstructor_recipe import LEARNED
 from scenes.catalogue import SCENES
 from spikecam_env.checked import checked_count, checked_memory, checked_shape
 from spikecam_env.errors import InputError, unknown_name
-from spikecam_env.run_folder import run_folder
-from spikecam_env.whole import made_folder, write_text_whole
+from spikecam_env.whole import made_folder
 
 ABLATION = (
     "noisy",
@@ -42,17 +40,8 @@ ABLATION = (
     *("clean", "light-held", "light-mus", "light"),
 )
 METHODS = (
-    "noisy",
-    "tfp",
-    "ssml",
-    "spk2img-clean",
-    "spk2img-noisy",
-    "paper-mus",
-    "paper",
-    "fast",
-    "best",
-    "clean",
-    "light",
+    *("noisy", "tfp", "ssml", "spk2img-clean", "spk2img-noisy"),
+    *("paper-mus", "paper", "fast", "best", "clean", "light"),
 )
 REAL_METHODS = METHODS[:-2]
 REAL_ABLATION = ABLATION[:7]
@@ -66,17 +55,26 @@ class Table:
     """A table of the paper."""
 
     title: str
-    kind: str
-    """Of its cases (`exposed.StreamCase`)."""
+    kind: Kind[RowResult]
     rows: tuple[str, ...]
 
 
+def _judged(item: WorkItem[RowResult], made: RowStreams, exposed: ExposedStreams) -> dict[str, Any]:
+    shown = pictures_of(made, exposed, {column: item.weights.path(column) for column in item.columns})
+    if item.pictures is not None:
+        save_pictures(item.pictures, item.case, made.row, shown, exposed)
+    return judged(shown, made, exposed, planes_a_pass(item.source, item.weights), still=item.kind == STILL)
+
+
+PHM = Kind(RowResult, phm.expose, _judged)
+REAL = Kind(RowResult, real.expose, _judged)
+STILL = Kind(RowResult, held_out.expose_still, _judged)
 TABLES = {
-    "table1": Table("Table 1: PHM_N, pictures against the true light", "phm", METHODS),
-    "table2": Table("Table 2: real recordings, NIQE (lower is better)", "real", REAL_METHODS),
-    "table3": Table("Table 3: PHM_N, the ablation of refine module and MUS", "phm", ABLATION),
-    "table4": Table("Table 4: real recordings, the ablation by NIQE (lower is better)", "real", REAL_ABLATION),
-    "still": Table("Still scenes, well lit", "still", ("noisy", "paper", "best", "best-map", "clean")),
+    "table1": Table("Table 1: PHM_N, pictures against the true light", PHM, METHODS),
+    "table2": Table("Table 2: real recordings, NIQE (lower is better)", REAL, REAL_METHODS),
+    "table3": Table("Table 3: PHM_N, the ablation of refine module and MUS", PHM, ABLATION),
+    "table4": Table("Table 4: real recordings, the ablation by NIQE (lower is better)", REAL, REAL_ABLATION),
+    "still": Table("Still scenes, well lit", STILL, ("noisy", "paper", "best", "best-map", "clean")),
 }
 
 
@@ -135,21 +133,21 @@ def evaluate_table(name: str, request: TableRequest | None = None, *, progress: 
     cases, missing = _cases(table, request)
     _check_memory(cases)
     missing |= {row: why for row in rows if (why := why_not(ROWS[row].source, request.weights))}
-    missing |= {c: why for c in COLUMNS if c not in CLASSICAL and (why := request.weights.missing(c))}
+    missing |= {c: why for c in COLUMNS if c in LEARNED and (why := request.weights.missing(c))}
     here = [row for row in rows if row not in missing]
     columns = [column for column in COLUMNS if column not in missing]
     sizes = {row: parameters(ROWS[row].source, request.weights) for row in here}
-    if request.out is None:
-        records = _made(cases, here, columns, request, Results.opened(None, {}), None, progress)
-        return _result(name, rows, cases, records, missing, sizes)
-    with run_folder(request.out, "a table") as folder:
-        results = Results.opened(folder / f"{name}.jsonl", _settings(request))
-        with made_folder(folder / "pictures", "pictures") as pictures:
-            records = _made(cases, here, columns, request, results, pictures, progress)
+    with results_in(request.out, name, _settings(request), RowResult) as results:
+        folder = nullcontext() if request.out is None else made_folder(request.out / "pictures", "pictures")
+        with folder as pictures:
+            records = evaluated(
+                table.kind, cases, here, request.weights, results,
+                columns=columns, jobs=request.jobs, pictures=pictures, progress=progress,
+            )  # fmt: skip
         result = _result(name, rows, cases, records, missing, sizes)
-        write_text_whole(folder / f"{name}.json", json.dumps(result, indent=1) + "\n")
-        write_text_whole(folder / f"{name}.txt", report(result))
-        write_page(folder / f"{name}.png", pictures, cases, rows, records)
+        results.write(result, report(result))
+        if pictures is not None:
+            write_page(pictures.parent / f"{name}.png", pictures, cases, rows, records)
     return result
 
 
@@ -157,7 +155,7 @@ def _rows(table: Table, request: TableRequest) -> list[str]:
     for row in request.rows:
         if row not in ROWS:
             raise unknown_name("row", row, ROWS)
-    if table.kind == "real" and (lightless := [r for r in request.rows if ROWS[r].source in ("clean", "light")]):
+    if table.kind == REAL and (lightless := [r for r in request.rows if ROWS[r].source in ("clean", "light")]):
         raise InputError(f"row {lightless[0]!r} needs the true light, which real recordings do not have")
     wanted = {"noisy", *(request.rows or table.rows)}
     return [row for row in ROWS if row in wanted]
@@ -165,26 +163,27 @@ def _rows(table: Table, request: TableRequest) -> list[str]:
 
 def _cases(table: Table, request: TableRequest) -> tuple[list[StreamCase], dict[str, str]]:
     """The cases, and by name why others are missing."""
-    if table.kind == "real":
+    if table.kind == REAL:
         if request.real != real.FOLDER and not request.real.is_dir():
             raise InputError(f"there is no folder {request.real}; give the folder of the recordings")
         paths = [request.real / name for name in real.RECORDINGS]
         missing = {path.name: f"there is no recording {path}" for path in paths if not path.is_file()}
         return [case for path in paths if path.is_file() for case in real.real_cases(path)], missing
     checked_count(request.seeds, "seeds")
-    if table.kind == "still":
-        shape, frames = checked_shape(request.shape or still.SHAPE), checked_count(request.frames or still.FRAMES)
-        names = still.still_scenes(checked_count(request.still_scenes, "scenes"))
-        return [StreamCase("still", n, seed, shape, frames, 0.0) for n in names for seed in range(request.seeds)], {}
+    if table.kind == STILL:
+        shape, frames = (
+            checked_shape(request.shape or held_out.STILL_SHAPE),
+            checked_count(request.frames or held_out.STILL_FRAMES),
+        )
+        names = held_out.still_scenes(checked_count(request.still_scenes, "scenes"))
+        return [StreamCase(n, seed, shape, frames, 0.0) for n in names for seed in range(request.seeds)], {}
     if request.data is not None:
         return [case for case in phm.dataset_cases(request.data) if case.scene in request.scenes], {}
     for scene in request.scenes:
         if scene not in SCENES:
             raise unknown_name("scene", scene, SCENES)
     return [
-        StreamCase(
-            "phm", scene, seed, checked_shape(request.shape or (250, 400)), _frames(request, interval), interval, speed
-        )
+        StreamCase(scene, seed, checked_shape(request.shape or (250, 400)), _frames(request, interval), interval, speed)
         for interval, speed, scene, seed in product(
             request.intervals, request.speeds, request.scenes, range(request.seeds)
         )
@@ -216,35 +215,6 @@ def _settings(request: TableRequest) -> dict[str, Any]:
     }
 
 
-def _made(
-    cases: list[StreamCase],
-    rows: list[str],
-    columns: list[str],
-    request: TableRequest,
-    results: Results,
-    pictures: Path | None,
-    progress: bool,
-) -> list[RowResult]:
-    """All records, of earlier runs and of this one, in the order of cases and rows."""
-    drawn = {case.scene: case for case in reversed(cases)}  # the first of each scene
-    wanted = [
-        task
-        for case in cases
-        for task in tasks(case, rows, columns, request.weights, pictures if case is drawn[case.scene] else None)
-    ]
-    todo = undone(wanted, results)
-    bar = tqdm(
-        total=len(wanted), initial=len(wanted) - len(todo), desc="evaluate", unit="stream", leave=False,
-        disable=not progress,
-    )  # fmt: skip
-    with bar:
-        for records in work(todo, request.jobs):
-            results.add(records)
-            bar.update()
-    keys = [(c.scene, c.seed, c.interval, c.speed, row) for c in cases for row in rows]
-    return [results.records[key] for key in keys]
-
-
 def _result(
     name: str,
     rows: list[str],
@@ -260,7 +230,7 @@ def _result(
         "settings": {
             "scenes": list(dict.fromkeys(case.scene for case in cases)),
             "seeds": len({case.seed for case in cases}),
-            "seeds_are_instants": TABLES[name].kind == "real",
+            "seeds_are_instants": TABLES[name].kind == REAL,
             "shapes": [list(shape) for shape in dict.fromkeys(case.shape for case in cases)],
             "frames": list(dict.fromkeys(case.frames for case in cases)),
             "data": sorted({case.folder for case in cases if case.folder}),

@@ -16,8 +16,11 @@ from pathlib import Path
 from typing import Any
 
 from denoiser.evaluate import fixed_pattern, halves
-from denoiser.evaluate.quick import PICTURES, Summary, evaluate_quick
-from denoiser.evaluate.restored import Weights, denoisers
+from denoiser.evaluate.case import ScoredPictures
+from denoiser.evaluate.fixed_pattern import evaluate_pattern, evaluate_simulated_pattern
+from denoiser.evaluate.quick import PICTURES, Summary, held_out_tables
+from denoiser.evaluate.rows import WeightFiles, Weights, denoiser
+from denoiser.evaluate.work import results_in
 from spikecam_env.sensor import SensorModel
 from spikecam_env.streams import read_recording
 
@@ -30,9 +33,10 @@ def evaluate_truth(
     moving: str | os.PathLike[str] | None = None,
     modes: Sequence[str] = ("paper", "best"),
     *,
-    weights: Weights | None = None,
+    weights: WeightFiles | None = None,
     scenes: int = 1,
     seed: int = 0,
+    out: str | os.PathLike[str] | None = None,
 ) -> dict[str, Any]:
     """Run the tests; those on recordings where there are recordings.
 
@@ -43,33 +47,37 @@ def evaluate_truth(
         weights: checkpoint by mode, instead of the shipped ones.
         scenes: simulated ones, for each camera of the pattern and each class of `quick`.
         seed: of the simulated scenes.
+        out: a folder for `truth.json`, `truth.txt` and the records of the held-out scenes, `truth.jsonl`; those are not
+            made again.
 
     Returns:
         "halves", "pattern" (by recording or camera), "measured" (by camera, as `evaluate_quick`), "settings".
 
     Raises:
-        InputError: recordings that cannot be read, are too short, or dark, or nowhere at rest.
+        InputError: recordings that cannot be read, are too short, or dark, or nowhere at rest; an unknown mode, or
+            weights that cannot be read; another run at work in `out`.
     """
     recordings = {path: read_recording(Path(path)).spikes for path in (static, moving) if path is not None}
-    online = denoisers(modes, weights)
-    result: dict[str, Any] = {
-        "settings": {
-            "static": None if static is None else str(static),
-            "moving": None if moving is None else str(moving),
-            "modes": list(modes),
-            "scenes": scenes,
-            "seed": seed,
-        },
-        "halves": None if static is None else halves.evaluate_halves(recordings[static], online),
-        "pattern": {},
-    }
-    if moving is not None:
-        result["pattern"][Path(moving).name] = fixed_pattern.evaluate_pattern(recordings[moving], online)
-    result["pattern"] |= fixed_pattern.evaluate_simulated_pattern(online, scenes=scenes, seed=seed)
-    result["measured"] = {
-        name: evaluate_quick(modes, weights=weights, scenes_a_class=scenes, seed=seed, model=model)
-        for name, model in cameras().items()
-    }
+    given = Weights.of_modes(modes, weights)
+    online = {mode: denoiser(mode, given) for mode in modes}
+    with results_in(out, "truth", {}, ScoredPictures) as results:
+        patterns = {} if moving is None else {Path(moving).name: evaluate_pattern(recordings[moving], online)}
+        result = {
+            "settings": {
+                "static": None if static is None else str(static),
+                "moving": None if moving is None else str(moving),
+                "modes": list(modes),
+                "scenes": scenes,
+                "seed": seed,
+            },
+            "halves": None if static is None else halves.evaluate_halves(recordings[static], online),
+            "pattern": patterns | evaluate_simulated_pattern(online, scenes=scenes, seed=seed),
+            "measured": {
+                name: held_out_tables(modes, given, results, scenes, seed=seed, model=model, camera=f"{name}:")
+                for name, model in cameras().items()
+            },
+        }
+        results.write(result, report(result))
     return result
 
 

@@ -3,45 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated
 
 import tyro
 
 from spikecam_env.cli.evaluate_agents import Agents
-from spikecam_env.cli.evaluate_spikezoo import SpikeZoo
+from spikecam_env.cli.evaluate_modes import Quick, SpikeZoo, Truth
 from spikecam_env.cli.evaluate_tables import StillScenes, Table1, Table2, Table3, Table4
 from spikecam_env.cli.evaluate_tasks import Tasks
-from spikecam_env.cli.evaluate_truth import EvaluateTruth
-from spikecam_env.cli.mode_weights import Mode, ModeWeights
-from spikecam_env.numbers import Seed, WholeRange
-
-
-@dataclass
-class Quick:
-    """Compare noisy, denoised and clean-twin streams on held-out scenes.
-
-    Held-out textures, speeds and light levels, TFP 21 and 41, against true light and the clean twin.
-
-    example:  spikecam evaluate quick --out evaluation
-    """
-
-    out: Path | None = None
-    """Folder for evaluate.json and evaluate.txt."""
-    modes: tuple[Mode, ...] = ("paper", "best")
-    """Modes to evaluate."""
-    scenes: Annotated[int, WholeRange(1, 1000)] = 2
-    """Scenes in each class of speed and light; the same count again gives a finer mean."""
-    seed: Seed = 0
-    """Seed of the held-out scenes, cameras and noise."""
-    weights: ModeWeights = field(default_factory=ModeWeights)
-
-    def run(self) -> None:
-        from denoiser.evaluate import evaluate_quick, report
-        from spikecam_env.cli.files import show_evaluation
-
-        options: dict[str, Any] = {"weights": self.weights.by_mode(), "scenes_a_class": self.scenes, "seed": self.seed}
-        show_evaluation("evaluate", self.out, lambda: evaluate_quick(self.modes, **options), report)
 
 
 @dataclass
@@ -62,7 +31,7 @@ class Evaluate:
         | Annotated[SpikeZoo, tyro.conf.subcommand("spikezoo", prefix_name=False)]
         | Annotated[Tasks, tyro.conf.subcommand("tasks", prefix_name=False)]
         | Annotated[Agents, tyro.conf.subcommand("agents", prefix_name=False)]
-        | Annotated[EvaluateTruth, tyro.conf.subcommand("truth", prefix_name=False)]
+        | Annotated[Truth, tyro.conf.subcommand("truth", prefix_name=False)]
     ) = field(default_factory=Quick)
 
     def run(self) -> None:

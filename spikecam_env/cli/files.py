@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable
-from contextlib import AbstractContextManager, nullcontext
+from contextlib import AbstractContextManager
 from pathlib import Path
 from typing import Any
 
@@ -24,18 +23,3 @@ def json_text(data: Any) -> str:
 def write_json(path: Path, data: Any) -> None:
     """Write data as indented JSON; the file appears whole."""
     write_text_whole(path, json_text(data) + "\n")
-
-
-def show_evaluation(
-    name: str, out: Path | None, evaluate: Callable[[], dict[str, Any]], report: Callable[[dict[str, Any]], str]
-) -> None:
-    """Evaluate, print the report, and write NAME.json and NAME.txt into a folder where one is given."""
-    from denoiser.evaluate.writing import write_result
-
-    with nullcontext() if out is None else out_folder(out) as folder:
-        result = evaluate()
-        if folder is not None:
-            write_result(folder, name, result, report(result))
-    print(report(result), end="")
-    if out is not None:
-        print(f"wrote {name}.json and {name}.txt in {out}")

@@ -13,7 +13,7 @@ from tqdm import tqdm
 
 from denoiser import OnlineDnSS
 from denoiser.evaluate.metrics import psnr_db
-from denoiser.evaluate.restored import restored
+from denoiser.evaluate.rows import restored
 from scenes.protocol import Gaze
 from spikecam_env.checked import checked_memory
 from spikecam_env.cli.before_after import WINDOW, instant_panel, light_db, light_panel, mean_panel, white_of

@@ -6,13 +6,13 @@ import numpy as np
 import pytest
 
 from denoiser import denoise
-from denoiser.evaluate.restored import denoisers, restored
+from denoiser.evaluate.rows import Weights, denoiser, restored
 from spikecam_env.errors import InputError
 
 
 def test_the_same_bits_as_denoise_and_how_many_were_whole():
     spikes = (np.random.default_rng(0).random((75, 16, 24)) < 0.2).astype(np.uint8)
-    online = denoisers(["best"])["best"]
+    online = denoiser("best", Weights())
     found = restored(online, spikes)
     fired, rates = denoise(spikes, "best", output="both")
     assert np.array_equal(found.spikes, fired) and np.array_equal(found.rates, rates)
@@ -25,4 +25,4 @@ def test_the_same_bits_as_denoise_and_how_many_were_whole():
 def test_weights_that_are_none_are_refused(tmp_path):
     (tmp_path / "x.pt").write_text("text")
     with pytest.raises(InputError, match=r"x\.pt"):
-        denoisers(["best"], {"best": tmp_path / "x.pt"})
+        Weights.of_modes(["best"], {"best": tmp_path / "x.pt"})

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import shutil
 from pathlib import Path
 
@@ -66,6 +67,15 @@ def test_a_stream_of_even_light_has_the_picture_that_it_should(tmp_path):
     assert "1 clips" in report(result)
 
 
+def test_a_picture_without_error_is_null_in_the_files_and_infinite_in_the_result(tmp_path):
+    """Nothing fires before black: TFP is exact, TFI is 1/40 and cut at black no more."""
+    write_clip(tmp_path, "a", np.zeros((63, 16, 24), np.uint8), np.zeros((16, 24)))
+    for _ in range(2):  # made, then read
+        result = evaluate_spikezoo(tmp_path, (), out=tmp_path / "out")
+        assert result["clips"][0]["PSNR"] == result["rows"][0]["PSNR"] == np.inf
+    assert json.loads((tmp_path / "out" / "spikezoo.json").read_text())["clips"][0]["PSNR"] is None
+
+
 def test_a_clip_of_too_few_frames_is_refused(tmp_path):
     write_clip(tmp_path, "a", np.zeros((40, 16, 24), np.uint8), np.zeros((16, 24)))
     with pytest.raises(InputError, match="40 frames"):
@@ -92,7 +102,9 @@ def test_a_film_is_exported_and_evaluated_with_its_own_spikes_and_truth(tmp_path
     row = list(truth["frame"]).index(100.5)
     assert np.array_equal(spikes, read_recording(tmp_path / "wave.h5", first=40, count=121).spikes)
     assert np.abs(picture - np.minimum(truth["radiance"][row] / 0.6, 1)).max() <= 0.5 / 255 + 1e-6
-    assert {p.name for p in (tmp_path / "result").iterdir()} == {"spikezoo.json", "spikezoo.txt"}
+    assert {p.name for p in (tmp_path / "result").iterdir()} == {
+        f"spikezoo.{kind}" for kind in ("json", "jsonl", "txt")
+    }
 
 
 @pytest.fixture(scope="module")

@@ -10,8 +10,9 @@ import numpy as np
 import pytest
 import torch
 
-from denoiser.evaluate import exposed, still, tables, work
-from denoiser.evaluate.exposed import StreamCase
+from denoiser.evaluate import held_out, judge, tables, work
+from denoiser.evaluate import rows as row_streams
+from denoiser.evaluate.case import StreamCase
 from denoiser.evaluate.judge import RowResult
 from denoiser.evaluate.rows import ROWS, Weights, why_not
 from denoiser.evaluate.table_report import report
@@ -187,8 +188,8 @@ def test_learned_reconstructions_are_columns_and_pipelines(tmp_path: Path, monke
     def films(name, spikes, frames, weights):
         return np.stack([middleTFP(spikes, t, 41) for t in frames])
 
-    monkeypatch.setattr(exposed, "reconstruct", lambda name, spikes, t, weights: middleTFP(spikes, t, 41))
-    monkeypatch.setattr(exposed, "reconstruct_many", films)
+    monkeypatch.setattr(judge, "reconstruct", lambda name, spikes, t, weights: middleTFP(spikes, t, 41))
+    monkeypatch.setattr(row_streams, "reconstruct_many", films)
     request = replace(SMALL, seeds=1, rows=("noisy", "tfp", "ssml", "spk2img-noisy"))
     found = evaluate_table("table1", replace(request, weights=Weights.found(tmp_path, {})))
     rows = found["groups"][0]["rows"]
@@ -266,9 +267,9 @@ def test_the_spread_is_over_seeds_of_the_mean_over_scenes() -> None:
 
 def test_the_calibration_of_a_still_scene_is_of_the_camera_before_it() -> None:
     """Against the rates of the same camera before even light: its gain and dark explain nearly all of their spread."""
-    case = StreamCase("still", "bright 0", 3, (24, 32), 400)
-    found = PixelMap.of(still.calibrated(case))
-    camera = SpikeSensor(SensorModel.preset("scsim"), case.shape, still.unit_seed(case))
+    case = StreamCase("bright 0", 3, (24, 32), 400)
+    found = PixelMap.of(held_out.calibrated(case))
+    camera = SpikeSensor(SensorModel.preset("scsim"), case.shape, held_out.unit_seed(case))
     rate = camera.step(np.full(case.shape, 0.3, np.float32), 4000).mean(axis=0)
     left = np.std(rate - (0.3 * found.gain + found.dark)) / np.std(rate)
     print(f"spread of the rates that the maps leave: {left:.3f}")

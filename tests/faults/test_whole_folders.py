@@ -52,7 +52,7 @@ def test_a_result_of_which_the_largest_file_cannot_be_written_leaves_the_folder_
     assert not tree(tmp_path / "new")
 
 
-@pytest.mark.parametrize("command", ["denoise", "ladder", "evaluate truth"])
+@pytest.mark.parametrize("command", ["denoise", "ladder", "calibrate"])
 def test_a_result_replaces_the_one_before_and_leaves_other_files(
     command: str, tmp_path: Path, inputs: dict[str, Path], monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -23,6 +23,7 @@ from scenes import VideoScene
 from scenes.catalogue import make_scene
 from spikecam_env.calibration import calibrate
 from spikecam_env.cli.main import run
+from spikecam_env.datasets.spikezoo import write_clip
 from spikecam_env.gap.ladder import Ladder, Rung
 from spikecam_env.sensor import SensorModel
 
@@ -104,15 +105,17 @@ DEMO: Work = {
 }
 TRAINING: Work = {"denoiser.training.simulated:Bank.drawn": _bank}
 EVALUATION: Work = {
-    "denoiser.evaluate:evaluate_quick": _result,
+    "denoiser.evaluate.quick:held_out_tables": _result,
+    "denoiser.evaluate.quick:report": lambda _: "figures\n" * 200,
     "denoiser.evaluate:report": lambda _: "figures\n" * 200,
 }
 SPIKEZOO: Work = {
-    "denoiser.evaluate.spikezoo:evaluate_spikezoo": _result,
-    "denoiser.evaluate.spikezoo:report": lambda _: "figures\n" * 200,
+    "denoiser.evaluate.spikezoo:evaluated": lambda *_, **__: [],
+    "denoiser.evaluate.spikezoo:report": lambda _: "figures\n" * 2000,
 }
 TRUTH: Work = {
-    "denoiser.evaluate.truth:evaluate_truth": _result,
+    "denoiser.evaluate.truth:evaluate_simulated_pattern": _result,
+    "denoiser.evaluate.truth:held_out_tables": _result,
     "denoiser.evaluate.truth:report": lambda _: "figures\n" * 200,
 }
 TASKS: Work = {"spikecam_env.envs.score:baselines": lambda *_, **__: [{"task": "x" * 9000}]}
@@ -151,14 +154,14 @@ WRITINGS: dict[str, Writing] = {
     "train ssml": Writing(
         "train --mode ssml --out {out} --steps 1 --batch 1 --patch 16 --width 12", "run", TRAINING, resumes=True
     ),
-    "evaluate": Writing("evaluate quick --out {out}", "evaluation", EVALUATION),
+    "evaluate": Writing("evaluate quick --out {out}", "evaluation", EVALUATION, resumes=True),
     "evaluate table": Writing(
         f"evaluate table1 --out {{out}} --rows noisy --scenes disk --seeds 1 --frames 200 {' '.join(SMALL)}",
         "table",
         {},
         resumes=True,
     ),
-    "evaluate spikezoo": Writing("evaluate spikezoo {recordings} --out {out}", "evaluation", SPIKEZOO),
+    "evaluate spikezoo": Writing("evaluate spikezoo {clips} --out {out}", "evaluation", SPIKEZOO, resumes=True),
     "evaluate tasks": Writing("evaluate tasks --tasks Catch-v1 --episodes 1 --json {out}", "tasks.json", TASKS),
     "train-agent": Writing("train-agent Catch-v1 --out {out} --steps 2 --environments 2", "agent", {}, resumes=True),
     "evaluate agents": Writing(
@@ -167,7 +170,7 @@ WRITINGS: dict[str, Writing] = {
         {},
         resumes=True,
     ),
-    "evaluate truth": Writing("evaluate truth --out {out}", "evaluation", TRUTH),
+    "evaluate truth": Writing("evaluate truth --out {out}", "evaluation", TRUTH, resumes=True),
     "export": Writing("export {recording} --frames 33 --out {out}", "exported", {}),
     "calibrate": Writing("calibrate {campaign} --out {out}", "calibrated", CALIBRATION),
     "campaign simulate": Writing(
@@ -184,11 +187,12 @@ WRITINGS: dict[str, Writing] = {
 
 
 def inputs_in(folder: Path) -> dict[str, Path]:
-    """A recording, the folder that it is in, a campaign of flats, and a film."""
+    """A recording, the folder that it is in, a campaign of flats, a film, and a clip in Spike-Zoo's layout."""
     recordings = folder / "recordings"
     recordings.mkdir()
     made = {"recording": recordings / "disk.h5", "recordings": recordings, "campaign": folder / "campaign"}
-    made["film"] = folder / "film.npy"
+    made |= {"film": folder / "film.npy", "clips": folder / "clips"}
+    write_clip(made["clips"], "a", np.ones((64, 16, 24), np.uint8), np.ones((16, 24)))
     np.save(made["film"], np.random.default_rng(0).integers(0, 255, (9, 24, 40), dtype=np.uint8))
     assert run(["record", "--out", str(made["recording"]), "--frames", "64", "--truth-every", "16", *SMALL]) == 0
     levels = [word for level in ("0.1", "0.2", "0.4") for word in ("--recording", f"flat:radiance={level}")]

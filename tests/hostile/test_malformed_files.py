@@ -15,6 +15,7 @@ import pytest
 from mutations import damaged, json_files, npz, npz_files, toml_files
 from tally import each, reads_or_refuses
 
+from denoiser.evaluate.judge import RowResult
 from denoiser.evaluate.work import FORMAT, Results
 from denoiser.networks.reconstructor_recipe import WIDTH_STEP, reconstructor_recipe
 from denoiser.weights import load_reconstructor, load_weights, pretrained_path, save_weights
@@ -431,7 +432,7 @@ def test_a_malformed_head_of_results_is_refused(tmp_path: Path) -> None:
     def check(data: bytes) -> None:
         path = tmp_path / "table1.jsonl"
         path.write_bytes(data.replace(b"\n", b" ") + b"\n" + json.dumps(RESULT).encode())
-        reads_or_refuses("results .jsonl", lambda: Results.opened(path, EVALUATION))
+        reads_or_refuses("results .jsonl", lambda: Results.opened(path, EVALUATION, RowResult))
 
     each(json_files({"format": FORMAT, **EVALUATION}), check)
 
@@ -440,7 +441,7 @@ def test_a_malformed_result_is_refused(tmp_path: Path) -> None:
     def check(data: bytes) -> None:
         path = tmp_path / "table1.jsonl"
         path.write_bytes(json.dumps({"format": FORMAT, **EVALUATION}).encode() + b"\n" + data.replace(b"\n", b" "))
-        reads_or_refuses("results .jsonl", lambda: Results.opened(path, EVALUATION))
+        reads_or_refuses("results .jsonl", lambda: Results.opened(path, EVALUATION, RowResult))
 
     each(json_files(RESULT, within=2), check)
 

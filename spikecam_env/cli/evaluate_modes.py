@@ -1,0 +1,101 @@
+"""`spikecam evaluate quick | spikezoo | truth`: modes on held-out scenes, on clips, and where no light is known."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Annotated, Any
+
+import tyro
+
+from spikecam_env.cli.mode_weights import Mode, ModeWeights
+from spikecam_env.numbers import Positive, Seed, WholeRange
+
+
+@dataclass
+class Quick:
+    """Compare noisy, denoised and clean-twin streams on held-out scenes.
+
+    Held-out textures, speeds and light levels, TFP 21 and 41, against true light and the clean twin.
+
+    example:  spikecam evaluate quick --out evaluation
+    """
+
+    out: Path | None = None
+    """Folder for evaluate.json, evaluate.txt and evaluate.jsonl; a run that was stopped goes on in it."""
+    modes: tuple[Mode, ...] = ("paper", "best")
+    """Modes to evaluate."""
+    scenes: Annotated[int, WholeRange(1, 1000)] = 2
+    """Scenes in each class of speed and light; the same count again gives a finer mean."""
+    seed: Seed = 0
+    """Seed of the held-out scenes, cameras and noise."""
+    weights: ModeWeights = field(default_factory=ModeWeights)
+
+    def run(self) -> None:
+        from denoiser.evaluate import evaluate_quick, report
+
+        options: dict[str, Any] = {"weights": self.weights.by_mode(), "scenes_a_class": self.scenes, "seed": self.seed}
+        _show("evaluate", self.out, report(evaluate_quick(self.modes, out=self.out, **options)))
+
+
+@dataclass
+class SpikeZoo:
+    """PSNR and SSIM of pictures at the middle of clips in Spike-Zoo's layout, as Spike-Zoo computes them.
+
+    Rows: TFP and TFI over 41 frames of the noisy spikes and of each mode's, and its rate planes.  No random numbers.
+
+    example:  spikecam evaluate spikezoo reds --out evaluation
+    """
+
+    folder: tyro.conf.Positional[Path]
+    """Folder of spike/*.dat and gt/*.png of the same names, or test/ with them.  Pictures say rows and columns."""
+    out: Path | None = None
+    """Folder for spikezoo.json, spikezoo.txt and spikezoo.jsonl; a run that was stopped goes on in it."""
+    modes: tuple[Mode, ...] = ("paper", "best")
+    """Modes to evaluate."""
+    rate: Positive = 0.6
+    """Light [spikes/frame] that is white in the pictures; 0.6 in Spike-Zoo's REDS clips."""
+    weights: ModeWeights = field(default_factory=ModeWeights)
+
+    def run(self) -> None:
+        from denoiser.evaluate.spikezoo import evaluate_spikezoo, report
+
+        options: dict[str, Any] = {"weights": self.weights.by_mode(), "rate": self.rate}
+        _show("spikezoo", self.out, report(evaluate_spikezoo(self.folder, self.modes, out=self.out, **options)))
+
+
+@dataclass
+class Truth:
+    """Compare with measured truth: a recording's other half, the fixed pattern of a moving one, measured cameras.
+
+    Without recordings the simulated tests alone are run.  Options of reading a recording go into a side file beside
+    it (docs/recordings.md).
+
+    example:  spikecam evaluate truth --static wall.npz --moving helicopter.npz --out evaluation
+    """
+
+    static: Path | None = None
+    """A recording of a scene at rest: one half is denoised, the mean of the other is the truth."""
+    moving: Path | None = None
+    """A recording in which everything moves: a pattern that stays is the camera's own."""
+    out: Path | None = None
+    """Folder for truth.json, truth.txt and truth.jsonl; the held-out scenes in it are not evaluated again."""
+    modes: tuple[Mode, ...] = ("paper", "best")
+    """Modes to evaluate."""
+    scenes: Annotated[int, WholeRange(1, 1000)] = 1
+    """Simulated scenes for each camera, and in each class of speed and light."""
+    seed: Seed = 0
+    """Seed of the simulated scenes, cameras and noise."""
+    weights: ModeWeights = field(default_factory=ModeWeights)
+
+    def run(self) -> None:
+        from denoiser.evaluate.truth import evaluate_truth, report
+
+        options: dict[str, Any] = {"weights": self.weights.by_mode(), "scenes": self.scenes, "seed": self.seed}
+        _show("truth", self.out, report(evaluate_truth(self.static, self.moving, self.modes, out=self.out, **options)))
+
+
+def _show(name: str, out: Path | None, report: str) -> None:
+    print(report, end="")
+    if out is not None:
+        print(f"wrote {name}.json and {name}.txt in {out}")
