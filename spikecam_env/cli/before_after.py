@@ -6,12 +6,8 @@ caption says which: motion smears the first, not the second.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
-import numpy as np
-
 from denoiser.evaluate.metrics import psnr_db
-from spikecam_env.cli.panels import PicturePanel
+from spikecam_env.cli.screen.screen import PicturePanel
 from spikecam_env.streams import middleTFP
 from spikecam_env.types import Pictures, Spikes
 
@@ -19,11 +15,6 @@ WINDOW = 41
 """Frames of a mean (TFP): the width of the denoiser's own window in the paper."""
 WHITE = 99.8
 """Percentile of light that is shown white: the few pixels above it are highlights."""
-
-
-def white_of(pictures: Pictures | Sequence[Pictures]) -> float:
-    """The light that is shown white, in the unit of the pictures; 1 where they are all dark."""
-    return float(np.percentile(pictures, WHITE)) or 1.0
 
 
 def mean_panel(title: str, spikes: Spikes, frame: int, window: int, light: Pictures | None = None) -> PicturePanel:

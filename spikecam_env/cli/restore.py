@@ -11,9 +11,9 @@ from typing import Any
 import numpy as np
 
 from denoiser.online import OnlineDnSS, pieces_of
-from spikecam_env.cli.before_after import WINDOW, instant_panel, light_db, light_panel, mean_panel, over, white_of
-from spikecam_env.cli.panels import PicturePanel
+from spikecam_env.cli.before_after import WHITE, WINDOW, instant_panel, light_db, light_panel, mean_panel, over
 from spikecam_env.cli.recording import HDF5
+from spikecam_env.cli.screen.screen import PicturePanel, white_of
 from spikecam_env.errors import InputError
 from spikecam_env.streams import middleTFI, middleTFP, read_truth
 from spikecam_env.streams.hdf5 import is_recording
@@ -69,7 +69,7 @@ class DenoisedRecording:
     @property
     def white(self) -> float:
         """The light that pictures show white."""
-        return white_of([self.planes[frame] for frame in evenly(list(self.planes), MOST_JUDGED)])
+        return white_of([self.planes[frame] for frame in evenly(list(self.planes), MOST_JUDGED)], WHITE)
 
     def rows(self) -> list[dict[str, Any]]:
         """A row a picture: mean rate [spikes/frame], and PSNR [dB] where the true light is known; means over the frames
@@ -151,13 +151,16 @@ def _light(path: Path, row: int, shape: tuple[int, int]) -> Pictures:
     return np.asarray(light[0], np.float32)
 
 
-def restore(noisy: Spikes, online: OnlineDnSS, at: Iterable[int]) -> tuple[Spikes, dict[int, Pictures], float]:
+def restore(
+    noisy: Spikes, online: OnlineDnSS, at: Iterable[int], chunk: int = 16
+) -> tuple[Spikes, dict[int, Pictures], float]:
     """Denoise a stream.
 
     Args:
         noisy: (T, H, W) spikes.
         online: The denoiser, with output "both".
         at: Frames whose rate plane is kept: planes are four bytes a pixel.
+        chunk: Frames that are pushed at a time.
 
     Returns:
         (T, H, W) denoised spikes, rate planes (H, W) [spikes/frame] by frame in order, and the denoiser's time [s].
@@ -166,7 +169,7 @@ def restore(noisy: Spikes, online: OnlineDnSS, at: Iterable[int]) -> tuple[Spike
     planes: dict[int, Pictures] = {}
     spikes = np.empty_like(noisy)
     began = time.perf_counter()
-    for first, (fired, rates) in pieces_of(online, noisy, title="denoise"):
+    for first, (fired, rates) in pieces_of(online, noisy, chunk, title="denoise"):
         spikes[first : first + len(fired)] = fired
         planes |= {frame: plane for frame, plane in enumerate(rates, first) if frame in wanted}
     return spikes, planes, time.perf_counter() - began
