@@ -117,11 +117,12 @@ class Play:
     def _end(self, env: gymnasium.Env[Any, Any], path: Path | None, held: set[str]) -> AbstractContextManager[End]:
         """A film, or a window in which keys are held down."""
         from spikecam_env.cli.live.episodes import FPS, most_seconds
+        from spikecam_env.cli.live.keys import STEERING
         from spikecam_env.cli.screen.film import film
         from spikecam_env.cli.screen.window import DisplayWindow
 
         if path is None:
-            return nullcontext(DisplayWindow(f"spikecam {self.id}", held))
+            return nullcontext(DisplayWindow(f"spikecam {self.id}", STEERING, held))
         episodes = self.episodes or 1
         most = episodes * most_seconds(env) * self.slow * FPS
         if most > MOST_PICTURES:

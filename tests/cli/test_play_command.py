@@ -15,9 +15,10 @@ from denoiser import OnlineDnSS
 from spikecam_env.cli.live.episode_screen import EpisodeScreen
 from spikecam_env.cli.live.episodes import Moment, environment, episode, most_seconds, pictures_due
 from spikecam_env.cli.live.filming import watch
-from spikecam_env.cli.live.keys import action_of, explained, plain
+from spikecam_env.cli.live.keys import action_of, explained
 from spikecam_env.cli.live.players import Player, player, steering
 from spikecam_env.cli.screen.screen import AIM, TARGET
+from spikecam_env.cli.screen.window import plain
 from spikecam_env.envs.score import BASELINES, play
 from tests.commands import film_in, spikecam
 

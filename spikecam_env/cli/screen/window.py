@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Collection
 from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
-from spikecam_env.cli.live.keys import STEERING, plain
 from spikecam_env.cli.screen.screen import BACKGROUND
 
 DPI = 100
@@ -37,13 +37,15 @@ class DisplayWindow:
 
     Args:
         title: of the window.
-        held: set to hold the keys that steer and are down.
+        steering: keys that steer; they count while they are down.
+        held: set that holds those of them that are down.
     """
 
-    def __init__(self, title: str, held: set[str] | None = None) -> None:
+    def __init__(self, title: str, steering: Collection[str] = (), held: set[str] | None = None) -> None:
         self.held = set[str]() if held is None else held
         self.pressed: list[str] = []
         self.closed = False
+        self._steering = steering
         self._title = title
         self._figure: Any = None
         self._until = time.perf_counter()
@@ -92,7 +94,7 @@ class DisplayWindow:
 
     def _press(self, event: Any) -> None:
         key = plain(event.key)
-        if key in STEERING:
+        if key in self._steering:
             self.held.add(key)
         elif key:
             self.pressed.append(key)
@@ -100,6 +102,12 @@ class DisplayWindow:
     def _close(self, event: Any) -> None:
         self.closed = True
         self._figure.canvas.stop_event_loop()
+
+
+def plain(key: str | None) -> str:
+    """A key's name without shift and the like: `shift+LEFT` and `left` steer alike."""
+    name = (key or "").rpartition("+")[2].lower()
+    return "space" if name == " " else name
 
 
 def has_display() -> bool:
