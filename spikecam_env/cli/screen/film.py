@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sized
 from contextlib import contextmanager
 from fractions import Fraction
 from math import ceil
@@ -98,8 +98,8 @@ def film(path: str | Path, fps: float, *, total: int | None = None, bar: bool = 
 def write_film(
     path: str | Path, pictures: Iterable[NDArray[np.uint8]], fps: float = 30.0, total: int | None = None
 ) -> None:
-    """Write pictures, (rows, columns, 3) uint8, as a `film` of so many a second."""
-    with film(path, fps, total=total) as made:
+    """Write pictures, (rows, columns, 3) uint8, as a `film` of so many a second.  total: where they have no length."""
+    with film(path, fps, total=len(pictures) if isinstance(pictures, Sized) else total) as made:
         for picture in pictures:
             made.show(picture, 1 / fps)
 
