@@ -98,7 +98,7 @@ class Demo:
             "frames": len(run.noisy),
             "camera's time, ms": 1e3 * len(run.noisy) / run.frame_rate_hz,
             "scene and camera, s": run.camera_s,
-            "denoiser, s": run.denoiser_s,
+            "denoiser, s": run.seconds,
             "x real time": run.times_real,
             "latency, frames": run.latency,
         }

@@ -100,7 +100,7 @@ class Denoise:
             writer.append(found.denoised)
 
     def _write_pictures(self, folder: Path, found: DenoisedRecording) -> None:
-        from spikecam_env.cli.before_after import instant
+        from spikecam_env.cli.restore import instant
         from spikecam_env.cli.screen.film import write_film, write_picture
         from spikecam_env.cli.screen.screen import compose
 

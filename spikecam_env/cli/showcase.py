@@ -16,8 +16,7 @@ from denoiser.evaluate.metrics import psnr_db
 from denoiser.evaluate.restored import restored
 from scenes.protocol import Gaze
 from spikecam_env.checked import checked_memory
-from spikecam_env.cli.before_after import WHITE, WINDOW, instant_panel, light_db, light_panel, mean_panel
-from spikecam_env.cli.restore import restore
+from spikecam_env.cli.restore import WHITE, WINDOW, DenoisedRecording, light_db, restore
 from spikecam_env.cli.screen.screen import compose, white_of
 from spikecam_env.errors import InputError
 from spikecam_env.sensor import SensorModel
@@ -39,25 +38,20 @@ TABLE_FRAMES = 250
 
 
 @dataclass(frozen=True)
-class Streamed:
-    """One run; streams are (T, H, W)."""
+class Streamed(DenoisedRecording):
+    """One run; planes and true light are of the middle frame of each block."""
 
-    mode: str
     frame_rate_hz: float
-    noisy: Spikes
+    mode: str
     clean: Spikes
-    planes: dict[int, Pictures]
-    """Rate planes (H, W) by frame, of the middle frame of each block."""
-    light: dict[int, Pictures]
-    """True light (H, W) of the same frames."""
+    """(T, H, W) of the clean twin."""
     camera_s: float
-    denoiser_s: float
-    latency: int
+    """That scene and camera took."""
 
     @property
     def times_real(self) -> float:
         """The camera's time over the time it took, scene, camera and denoiser together."""
-        return len(self.noisy) / self.frame_rate_hz / (self.camera_s + self.denoiser_s)
+        return len(self.noisy) / self.frame_rate_hz / (self.camera_s + self.seconds)
 
     @property
     def shown(self) -> list[int]:
@@ -99,8 +93,7 @@ def stream(
     online = OnlineDnSS.pretrained(mode, output="both")
     _compile(env, online, shape)
     still = np.zeros(2, np.float32)
-    starts = range(0, frames, BLOCK)
-    noisy, clean = (np.empty((len(starts) * BLOCK, *shape), np.uint8) for _ in range(2))
+    noisy, clean = (np.empty((-(-frames // BLOCK) * BLOCK, *shape), np.uint8) for _ in range(2))
     light, camera_s = {}, 0.0
     for first in trange(0, frames, BLOCK, desc="stream", unit="block", leave=False):
         began = time.perf_counter()
@@ -114,8 +107,10 @@ def stream(
         clean[first : first + BLOCK] = twin.step(camera.scene.radiance(*gaze.frames, gaze), BLOCK)
     frame_rate_hz = camera.model.frame_rate_hz
     env.close()
-    _, planes, denoiser_s = restore(noisy, online, light, BLOCK)
-    return Streamed(mode, frame_rate_hz, noisy, clean, planes, light, camera_s, denoiser_s, online.latency)
+    denoised, planes, seconds = restore(noisy, online, light, BLOCK)
+    return Streamed(
+        noisy, denoised, planes, light, WINDOW, frame_rate_hz, seconds, online.latency, mode, clean, camera_s
+    )
 
 
 def _camera(
@@ -139,14 +134,9 @@ def film_frames(run: Streamed) -> list[NDArray[np.uint8]]:
 
 def picture(run: Streamed, frame: int) -> NDArray[np.uint8]:
     """The screen at a frame of `run.shown`."""
-    light = run.light[frame]
-    panels = [
-        mean_panel("noisy spikes", run.noisy, frame, WINDOW, light),
-        instant_panel("denoised rate", run.planes[frame], light),
-        light_panel(light, frame, run.frame_rate_hz),
-    ]
+    noisy, _, rate, light = run.panels(frame)
     white = white_of(next(iter(run.light.values())), WHITE)
-    return compose(panels, white, corner=f"{run.mode}: denoised online, {run.latency} frames later")
+    return compose([noisy, rate, light], white, corner=f"{run.mode}: denoised online, {run.latency} frames later")
 
 
 def comparison(run: Streamed) -> list[dict[str, Any]]:

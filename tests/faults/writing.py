@@ -96,7 +96,7 @@ def _watched(*given: object) -> list[object]:
 
 def _streamed(**_: object) -> SimpleNamespace:
     return SimpleNamespace(
-        noisy=np.zeros(10), frame_rate_hz=4e4, camera_s=1.0, denoiser_s=1.0, times_real=1.0, latency=31, shown=[0]
+        noisy=np.zeros(10), frame_rate_hz=4e4, camera_s=1.0, seconds=1.0, times_real=1.0, latency=31, shown=[0]
     )
 
 
