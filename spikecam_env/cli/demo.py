@@ -89,11 +89,11 @@ class Demo:
         """Lines to print."""
         from spikecam_env.cli.files import write_json
         from spikecam_env.cli.screen.film import write_film, write_picture
-        from spikecam_env.cli.showcase import FILM_FRAMES, comparison, film_frames
+        from spikecam_env.cli.showcase import FILM_FRAMES, comparison, picture
         from spikecam_env.cli.table import table
 
         run = self._streamed(FRAMES, FILM_FRAMES)
-        frames, rows = film_frames(run), comparison(run)
+        frames, rows = [picture(run, frame) for frame in run.shown], comparison(run)
         speed: dict[str, Any] = {
             "frames": len(run.noisy),
             "camera's time, ms": 1e3 * len(run.noisy) / run.frame_rate_hz,

@@ -127,13 +127,8 @@ def _camera(
     return env, start | ({"seed": seed} if scene == "random" else {})
 
 
-def film_frames(run: Streamed) -> list[NDArray[np.uint8]]:
-    """One picture a shown block: noisy, denoised, true light, with PSNR against the true light."""
-    return [picture(run, frame) for frame in run.shown]
-
-
 def picture(run: Streamed, frame: int) -> NDArray[np.uint8]:
-    """The screen at a frame of `run.shown`."""
+    """The screen at a frame of `run.shown`: noisy, denoised, true light, with PSNR against the true light."""
     noisy, _, rate, light = run.panels(frame)
     white = white_of(next(iter(run.light.values())), WHITE)
     return compose([noisy, rate, light], white, corner=f"{run.mode}: denoised online, {run.latency} frames later")

@@ -96,7 +96,7 @@ def _watched(*given: object) -> list[object]:
 
 def _streamed(**_: object) -> SimpleNamespace:
     return SimpleNamespace(
-        noisy=np.zeros(10), frame_rate_hz=4e4, camera_s=1.0, seconds=1.0, times_real=1.0, latency=31, shown=[0]
+        noisy=np.zeros(10), frame_rate_hz=4e4, camera_s=1.0, seconds=1.0, times_real=1.0, latency=31, shown=range(12)
     )
 
 
@@ -105,8 +105,7 @@ FILM: Work = {"scenes:VideoScene": VideoScene}
 MODEL = SensorModel.preset("scsim")
 DEMO: Work = {
     "spikecam_env.cli.showcase:stream": _streamed,
-    "spikecam_env.cli.showcase:film_frames": _film,
-    "spikecam_env.cli.showcase:picture": lambda *_: _film()[0],
+    "spikecam_env.cli.showcase:picture": lambda _, frame: _film()[frame],
     "spikecam_env.cli.showcase:comparison": lambda _: [{"stream": "noisy"}],
 }
 TRAINING: Work = {
