@@ -33,38 +33,34 @@ class EpisodeScreen:
         self, task: str, who: str, *, denoise: bool = False, show_target: bool = False, keys: str = ""
     ) -> None:
         self._task, self._who, self._keys, self._show_target = task, who, keys, show_target
+        self.noisy: Pictures = np.empty((0, 0), np.float32)
+        self.denoised: Pictures | None = None
+        self._recent: list[Spikes] = []
+        self._white = 1.0
         self._online: Any = None
         if denoise:
             from denoiser import OnlineDnSS
 
             self._online = OnlineDnSS.pretrained("best", output="rate")
 
-    noisy: Pictures
-    denoised: Pictures | None
-    _recent: list[Spikes]
-    _white: float
-
     def see(self, moment: Moment) -> None:
         """Take in a moment's spikes; every moment, shown or not."""
         if moment.step == 0:
-            self._begin(moment.spikes)
+            self._recent, self.denoised = [], None
+            if self._online is not None:
+                self._online.reset()
         blocks = -(-WINDOW // len(moment.spikes))
         self._recent = [*self._recent, moment.spikes][-blocks:]
         self.noisy = np.concatenate(self._recent).mean(axis=0).astype(np.float32)
+        if moment.step == 0:
+            self._white = white_of(self.noisy)
         if self._online is not None and len(planes := self._online.push(moment.spikes)):
             self.denoised = planes[-1]
-
-    def _begin(self, spikes: Spikes) -> None:
-        """Another episode, of which these are the first."""
-        self._recent, self.denoised = [], None
-        self._white = white_of(spikes.mean(axis=0).astype(np.float32))
-        if self._online is not None:
-            self._online.reset()
 
     def picture(self, moment: Moment) -> NDArray[np.uint8]:
         """(rows, columns, 3) uint8, even sizes, of the moment that was seen last."""
         shown = [(self.noisy, "noisy spikes (TFP)", self._who)]
-        if self._online is not None and self.denoised is not None:
+        if self.denoised is not None:
             shown.append((self.denoised, "denoised (DnSS)", ""))
         elif self._online is not None:
             shown.append((self.noisy, "denoised (DnSS)", "noisy until the first frames are finished"))

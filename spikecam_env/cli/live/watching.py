@@ -42,8 +42,9 @@ class Watching:
 
     def on_screen(self, end: End) -> None:
         """Every picture as it comes, for as long as it is the newest; until the window is closed, or Esc is pressed."""
-        then = time.perf_counter()
-        while not (self._session.over or end.closed or "escape" in end.taken()):
+        then, over = time.perf_counter(), False
+        while not (over or end.closed or "escape" in end.taken()):
+            over = self._session.over  # asked first: the last picture may come just before the end
             shown, now = self._next(IDLE_S), time.perf_counter()
             if shown is not None:
                 picture = self._screen.picture(shown.noisy, shown.rate, str(self._lately))
