@@ -42,9 +42,8 @@ class Watching:
 
     def on_screen(self, end: End) -> None:
         """Every picture as it comes, for as long as it is the newest; until the window is closed, or Esc is pressed."""
-        then, over = time.perf_counter(), False
-        while not (over or end.closed or "escape" in end.taken()):
-            over = self._session.over  # asked first: the last picture may come just before the end
+        then = time.perf_counter()
+        while not (self._session.over or end.closed or "escape" in end.taken()):
             shown, now = self._next(IDLE_S), time.perf_counter()
             if shown is not None:
                 picture = self._screen.picture(shown.noisy, shown.rate, str(self._lately))
