@@ -19,7 +19,9 @@ def spikecam(*words: object) -> int:
 def said(error: str) -> list[str]:
     """Lines on standard error that are no progress bars."""
     lines = [part for line in error.splitlines() for part in line.split("\r")]
-    return [line for line in lines if line.strip() and "%|" not in line and "it/s" not in line]
+    return [
+        line for line in lines if line.strip() and "%|" not in line and "it/s" not in line and "frame/s" not in line
+    ]
 
 
 def film_in(path: Path) -> list[np.ndarray]:

@@ -8,16 +8,15 @@ from __future__ import annotations
 import sys
 from collections.abc import Iterator
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
 import gymnasium
-import matplotlib
 import numpy as np
 from numpy.typing import NDArray
-from PIL import Image, ImageDraw, ImageFont
+from PIL import Image, ImageDraw
 
 import spikecam_env.envs  # noqa: F401
+from spikecam_env.cli.screen.screen import BACKGROUND, FAINT, INK, font
 from spikecam_env.envs.oracle import oracle
 from spikecam_env.envs.tasks import Catch, ReadSpin, Saccade, Track
 from spikecam_env.envs.tasks.digits import DIGITS
@@ -32,7 +31,6 @@ ZOOM, MARGIN, CAPTION, TEXT = 3, 10, 24, 250  # [pixels], but for the first
 BESIDE = 1.5  # from a target to its mark [pixels of the observation]
 QUALITY = 80  # of the JPEG
 
-BACKGROUND, INK, FAINT = (16, 18, 22), (235, 238, 242), (150, 158, 170)
 TARGET, MIDDLE = (80, 220, 120), (255, 200, 60)
 
 WORDS = {
@@ -86,8 +84,8 @@ def page() -> Image.Image:
     picture = Image.new("RGB", (width, height * len(rows) + 2 * MARGIN + CAPTION), BACKGROUND)
     draw, left = ImageDraw.Draw(picture), float(MARGIN)
     for words, colour in LEGEND:
-        draw.text((left, MARGIN), words, colour, _font(14))
-        left += _font(14).getlength(words)
+        draw.text((left, MARGIN), words, colour, font(14))
+        left += font(14).getlength(words)
     for number, row in enumerate(rows):
         picture.paste(row, (0, number * height + MARGIN + CAPTION))
     return picture
@@ -121,12 +119,12 @@ def _row(name: str, shown: list[Moment]) -> Image.Image:
     width = TEXT + len(shown) * (side + MARGIN) + MARGIN
     row = Image.new("RGB", (width, side + MARGIN + CAPTION), BACKGROUND)
     draw = ImageDraw.Draw(row)
-    draw.text((MARGIN, MARGIN), name, INK, _font(20))
-    draw.text((MARGIN, MARGIN + 32), WORDS[name], FAINT, _font(14), spacing=5)
+    draw.text((MARGIN, MARGIN), name, INK, font(20))
+    draw.text((MARGIN, MARGIN + 32), WORDS[name], FAINT, font(14), spacing=5)
     for number, moment in enumerate(shown):
         left = TEXT + number * (side + MARGIN)
         row.paste(_marked(moment), (left, MARGIN))
-        draw.text((left, MARGIN + side + 4), moment.line, FAINT, _font(14))
+        draw.text((left, MARGIN + side + 4), moment.line, FAINT, font(14))
     return row
 
 
@@ -150,10 +148,6 @@ def _marked(moment: Moment) -> Image.Image:
         for bar in (middle - near, middle + near):
             draw.line((bar, 0, bar, ZOOM * rows), fill=MIDDLE, width=2)
     return picture
-
-
-def _font(size: int) -> ImageFont.FreeTypeFont:
-    return ImageFont.truetype(str(Path(matplotlib.get_data_path()) / "fonts" / "ttf" / "DejaVuSans.ttf"), size)
 
 
 def main() -> None:

@@ -77,27 +77,28 @@ class Demo:
 
     def _picture(self, folder: Path) -> list[str]:
         """Lines to print."""
-        from spikecam_env.cli.panels import write_picture
-        from spikecam_env.cli.showcase import PICTURE_FRAMES, last_picture
+        from spikecam_env.cli.screen.film import write_picture
+        from spikecam_env.cli.showcase import PICTURE_FRAMES, picture
 
-        write_picture(folder / "demo.png", last_picture(self._streamed(QUICK_FRAMES, PICTURE_FRAMES)))
+        run = self._streamed(QUICK_FRAMES, PICTURE_FRAMES)
+        write_picture(folder / "demo.png", picture(run, run.shown[-1]))
         what = "noisy spikes, denoised, true light; `spikecam demo` makes a film of them"
         return [f"wrote {self.out / 'demo.png'}: {what}"]
 
     def _film(self, folder: Path) -> list[str]:
         """Lines to print."""
         from spikecam_env.cli.files import write_json
-        from spikecam_env.cli.panels import write_film, write_picture
-        from spikecam_env.cli.showcase import FILM_FRAMES, comparison, film_frames
+        from spikecam_env.cli.screen.film import write_film, write_picture
+        from spikecam_env.cli.showcase import FILM_FRAMES, comparison, picture
         from spikecam_env.cli.table import table
 
         run = self._streamed(FRAMES, FILM_FRAMES)
-        frames, rows = film_frames(run), comparison(run)
+        frames, rows = [picture(run, frame) for frame in run.shown], comparison(run)
         speed: dict[str, Any] = {
             "frames": len(run.noisy),
             "camera's time, ms": 1e3 * len(run.noisy) / run.frame_rate_hz,
             "scene and camera, s": run.camera_s,
-            "denoiser, s": run.denoiser_s,
+            "denoiser, s": run.seconds,
             "x real time": run.times_real,
             "latency, frames": run.latency,
         }

@@ -100,13 +100,14 @@ class Denoise:
             writer.append(found.denoised)
 
     def _write_pictures(self, folder: Path, found: DenoisedRecording) -> None:
-        from spikecam_env.cli.before_after import instant
-        from spikecam_env.cli.panels import compose, write_film, write_picture
+        from spikecam_env.cli.restore import instant
+        from spikecam_env.cli.screen.film import write_film, write_picture
+        from spikecam_env.cli.screen.screen import compose
 
         white, rate_hz = found.white, found.frame_rate_hz
 
         def picture(frame: int, *, light: bool) -> NDArray[np.uint8]:
-            return compose(found.panels(frame, light=light), white, f"{self.mode}: {instant(frame, rate_hz)}")
+            return compose(found.panels(frame, light=light), white, corner=f"{self.mode}: {instant(frame, rate_hz)}")
 
         write_picture(folder / "pictures.png", picture(found.middle, light=True))
         if self.film:

@@ -100,7 +100,7 @@ class Agents:
     def _film(self, played: list[StudyRun]) -> None:
         from spikecam_env.agents.report import pictures
         from spikecam_env.agents.study import actor_of
-        from spikecam_env.cli.panels import write_film
+        from spikecam_env.cli.screen.film import write_film
 
         for case in played:
             env = case.played.make(split="test", render_mode="rgb_array")

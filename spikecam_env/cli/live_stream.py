@@ -74,12 +74,14 @@ class Live:
 
     def run(self) -> None:
         from denoiser.live import LiveDnSS
-        from denoiser.live.session import Session
+        from denoiser.live.session import PICTURES_S, Session
+        from spikecam_env.cli.files import check_place
         from spikecam_env.cli.live.watching import Watching
-        from spikecam_env.cli.live.window import has_display
+        from spikecam_env.cli.screen.film import film
+        from spikecam_env.cli.screen.window import DisplayWindow, has_display
         from spikecam_env.cli.table import table
 
-        self._check_film()
+        check_place("film", self.film, ".mp4")
         with self._source() as source:
             live = LiveDnSS(source.shape, self.weights or self.mode, passes=self.passes, unit=self.calibration)
             pace = {"speed": self.speed or 1.0, "pictures": self.pictures}
@@ -87,24 +89,16 @@ class Live:
             watching = Watching(session, source, str(self.weights or self.mode))
             with session:
                 if self.film is not None:
-                    watching.as_a_film(self.film)
+                    with film(self.film, PICTURES_S, bar=False) as end:
+                        watching.on_screen(end)
                 elif has_display():
-                    watching.in_a_window()
+                    watching.on_screen(DisplayWindow(f"spikecam live {source.title}"))
                 else:
                     print("no display: the figures alone; --film FILE.mp4 writes the pictures", flush=True)
                     watching.as_figures()
             print(table([watching.summary()]))
         if self.film is not None:
             print(f"wrote {self.film}")
-
-    def _check_film(self) -> None:
-        from spikecam_env.whole import check_file
-
-        if self.film is None:
-            return
-        if self.film.suffix.lower() != ".mp4":
-            raise InputError(f"--film {self.film}: unknown file type {self.film.suffix!r}; use .mp4")
-        check_file(self.film)
 
     @contextmanager
     def _source(self) -> Iterator[Source]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass, field
 from itertools import count
 from pathlib import Path
@@ -17,9 +18,10 @@ from spikecam_env.numbers import Range, Seed, WholeRange
 if TYPE_CHECKING:
     import gymnasium
 
+    from spikecam_env.cli.live.episode_screen import EpisodeScreen
     from spikecam_env.cli.live.episodes import Moment
     from spikecam_env.cli.live.players import Player
-    from spikecam_env.cli.live.screen import Screen
+    from spikecam_env.cli.screen.window import End
 
 KEYBOARD = "keyboard"
 MOST_SLOW = 10_000.0
@@ -67,24 +69,27 @@ class Play:
     camera: CameraOptions = field(default_factory=CameraOptions)
 
     def run(self) -> None:
+        from spikecam_env.cli.files import check_place
+        from spikecam_env.cli.live.filming import watch
         from spikecam_env.cli.live.players import Player, player, steering
-        from spikecam_env.cli.live.window import has_display
+        from spikecam_env.cli.screen.window import has_display
 
         film = self.film
         if film is None and not has_display():
             film = Path(f"{self.id.rpartition('/')[2]}.mp4")
         who = (KEYBOARD if film is None else "oracle") if self.policy is None else self.policy
-        if film is not None:
-            _check_film(film, who)
+        if film is not None and who == KEYBOARD:
+            raise InputError("--policy keyboard needs a window: run it where there is a display, without --film")
+        check_place("film", film, ".mp4")
         held: set[str] = set()
         acting = Player(steering(held)) if who == KEYBOARD else player(who)
         env = self._environment(acting)
         try:
-            screen = self._screen(env, who)
-            if film is None:
-                ended = self._in_a_window(env, acting, screen, held)
-            else:
-                ended = self._as_a_film(env, acting, screen, film)
+            episodes = self.episodes or (None if film is None else 1)
+            seeds = count(self.seed) if episodes is None else range(self.seed, self.seed + episodes)
+            with self._end(env, film, held) as end:
+                ended = watch(env, acting, self._screen(env, who), seeds, self.slow, end)
+            if film is not None:
                 print(f"wrote {film}: {who} at {self.id}, {self.slow:g} times slower than life")
             self._print(env, ended)
         finally:
@@ -96,9 +101,9 @@ class Play:
         size = {} if self.size is None else {"shape": self.size}
         return environment(self.id, acting, model=self.camera.load(), split=self.split, **size)
 
-    def _screen(self, env: gymnasium.Env[Any, Any], who: str) -> Screen:
+    def _screen(self, env: gymnasium.Env[Any, Any], who: str) -> EpisodeScreen:
+        from spikecam_env.cli.live.episode_screen import EpisodeScreen
         from spikecam_env.cli.live.keys import explained
-        from spikecam_env.cli.live.screen import Screen
 
         camera: Any = env.unwrapped
         keys = (
@@ -107,34 +112,24 @@ class Play:
             else ""
         )
         name = self.id.rpartition("/")[2]
-        return Screen(name, who, denoise=self.denoise, show_target=self.show_target, keys=keys)
+        return EpisodeScreen(name, who, denoise=self.denoise, show_target=self.show_target, keys=keys)
 
-    def _in_a_window(
-        self, env: gymnasium.Env[Any, Any], acting: Player, screen: Screen, held: set[str]
-    ) -> list[Moment]:
-        from spikecam_env.cli.live.filming import watch
-        from spikecam_env.cli.live.window import DisplayWindow
-
-        seeds = count(self.seed) if self.episodes is None else range(self.seed, self.seed + self.episodes)
-        return watch(
-            env, acting, screen, seeds, self.slow, lambda picture: DisplayWindow(f"spikecam {self.id}", picture, held)
-        )
-
-    def _as_a_film(self, env: gymnasium.Env[Any, Any], acting: Player, screen: Screen, film: Path) -> list[Moment]:
+    def _end(self, env: gymnasium.Env[Any, Any], path: Path | None, held: set[str]) -> AbstractContextManager[End]:
+        """A film, or a window in which keys are held down."""
         from spikecam_env.cli.live.episodes import FPS, most_seconds
-        from spikecam_env.cli.live.filming import pictures
-        from spikecam_env.cli.panels import write_film
+        from spikecam_env.cli.live.keys import STEERING
+        from spikecam_env.cli.screen.film import film
+        from spikecam_env.cli.screen.window import DisplayWindow
 
+        if path is None:
+            return nullcontext(DisplayWindow(f"spikecam {self.id}", STEERING, held))
         episodes = self.episodes or 1
         most = episodes * most_seconds(env) * self.slow * FPS
         if most > MOST_PICTURES:
             raise InputError(
                 f"up to {most:.0f} pictures (--episodes {episodes}, --slow {self.slow:g}); at most {MOST_PICTURES}"
             )
-        ended: list[Moment] = []
-        seeds = range(self.seed, self.seed + episodes)
-        write_film(film, pictures(env, acting, screen, seeds, self.slow, ended), FPS)
-        return ended
+        return film(path, FPS)
 
     def _print(self, env: gymnasium.Env[Any, Any], ended: list[Moment]) -> None:
         from spikecam_env.cli.live.episodes import scored
@@ -160,13 +155,3 @@ class Play:
             ends = scored(env, ended)
             means = f"performance {ends.mean:.3f}, nothing {ends.nothing:.3f}, oracle {ends.oracle:.3f}"
             print(f"score {ends.score:.3f}: {means}")
-
-
-def _check_film(film: Path, who: str) -> None:
-    from spikecam_env.whole import check_file
-
-    if who == KEYBOARD:
-        raise InputError("--policy keyboard needs a window: run it where there is a display, without --film")
-    if film.suffix.lower() != ".mp4":
-        raise InputError(f"--film {film}: unknown file type {film.suffix!r}; use .mp4")
-    check_file(film)

@@ -1,4 +1,8 @@
-"""A recording through the online denoiser: its spikes, rate planes of chosen frames, and figures of both."""
+"""A recording through the online denoiser: its spikes, rate planes of chosen frames, and figures of both.
+
+A picture is a mean over a window of frames (TFP), or of one instant (TFI of spikes, the denoiser's rate plane).  Every
+caption says which: motion smears the first, not the second.
+"""
 
 from __future__ import annotations
 
@@ -10,17 +14,23 @@ from typing import Any
 
 import numpy as np
 
+from denoiser.evaluate.metrics import psnr_db
 from denoiser.online import OnlineDnSS, pieces_of
-from spikecam_env.cli.before_after import WINDOW, instant_panel, light_db, light_panel, mean_panel, over, white_of
-from spikecam_env.cli.panels import PicturePanel
 from spikecam_env.cli.recording import HDF5
+from spikecam_env.cli.screen.screen import PicturePanel, white_of
 from spikecam_env.errors import InputError
 from spikecam_env.streams import middleTFI, middleTFP, read_truth
 from spikecam_env.streams.hdf5 import is_recording
 from spikecam_env.types import Pictures, Spikes
 
+WINDOW = 41
+"""Frames of a mean (TFP): the width of the denoiser's own window in the paper."""
+WHITE = 99.8
+"""Percentile of light that is shown white: the few pixels above it are highlights."""
 MOST_PICTURES = 240
 """In a film: 8 seconds."""
+INTERVAL = "one interval"
+"""Frames of a TFI: the table alone has it."""
 MOST_JUDGED = 12
 """Frames that the table is of, evenly over the recording."""
 
@@ -59,30 +69,27 @@ class DenoisedRecording:
     def panels(self, frame: int, *, light: bool = True) -> list[PicturePanel]:
         """Before and after at a frame, beside the true light where it is known and asked for."""
         known = self.light.get(frame) if light else None
-        shown = [
-            mean_panel("noisy spikes", self.noisy, frame, self.window, known),
-            mean_panel("denoised spikes", self.denoised, frame, self.window, known),
-            instant_panel("denoised rate", self.planes[frame], known),
-        ]
-        return shown if known is None else [*shown, light_panel(known, frame, self.frame_rate_hz)]
+        panels = []
+        for (title, what), picture in self._pictures.items():
+            if what != INTERVAL:
+                shown = picture(frame)
+                line = what if known is None else f"{what}, PSNR {light_db(shown, known):.2f} dB"
+                panels.append(PicturePanel(shown, title, line))
+        if known is not None:
+            panels.append(PicturePanel(known, "true light", instant(frame, self.frame_rate_hz)))
+        return panels
 
     @property
     def white(self) -> float:
         """The light that pictures show white."""
-        return white_of([self.planes[frame] for frame in evenly(list(self.planes), MOST_JUDGED)])
+        return white_of([self.planes[frame] for frame in evenly(list(self.planes), MOST_JUDGED)], WHITE)
 
     def rows(self) -> list[dict[str, Any]]:
         """A row a picture: mean rate [spikes/frame], and PSNR [dB] where the true light is known; means over the frames
         with true light, or else over MOST_JUDGED of the planes."""
         frames = list(self.light) or evenly(list(self.planes), MOST_JUDGED)
-        pictures: dict[tuple[str, str], Callable[[int], Pictures]] = {
-            ("noisy spikes", over(self.window)): lambda t: middleTFP(self.noisy, t, self.window),
-            ("noisy spikes", "one interval"): lambda t: middleTFI(self.noisy, t),
-            ("denoised spikes", over(self.window)): lambda t: middleTFP(self.denoised, t, self.window),
-            ("denoised rate", over(1)): lambda t: self.planes[t],
-        }
         rows = []
-        for (name, of), picture in pictures.items():
+        for (name, of), picture in self._pictures.items():
             shown = [picture(t) for t in frames]
             row: dict[str, Any] = {"picture": name, "of": of, "spikes/frame": float(np.mean(shown))}
             if self.light:
@@ -90,6 +97,17 @@ class DenoisedRecording:
                 row["PSNR, light [dB]"] = float(np.mean(scores))
             rows.append(row)
         return rows
+
+    @property
+    def _pictures(self) -> dict[tuple[str, str], Callable[[int], Pictures]]:
+        """Pictures at a frame, by what they show and the frames that they are of."""
+        mean = "one frame" if self.window == 1 else f"mean of {self.window} frames"
+        return {
+            ("noisy spikes", mean): lambda t: middleTFP(self.noisy, t, self.window),
+            ("noisy spikes", INTERVAL): lambda t: middleTFI(self.noisy, t),
+            ("denoised spikes", mean): lambda t: middleTFP(self.denoised, t, self.window),
+            ("denoised rate", "one frame"): lambda t: self.planes[t],
+        }
 
     def speed(self) -> dict[str, Any]:
         """How fast the denoiser was, and how late; by the camera's clock too where its frame rate is known."""
@@ -99,6 +117,16 @@ class DenoisedRecording:
         late = {} if rate is None else {"latency, ms": 1e3 * self.latency / rate}
         work = {"denoiser, s": self.seconds, "frames/s": frames / self.seconds}
         return {"frames": frames, **known, **work, **real, "latency, frames": self.latency, **late}
+
+
+def instant(frame: int, frame_rate_hz: float | None) -> str:
+    """The middle of a frame by its number, and by the camera's clock where its rate is known: `frame 187, 4.69 ms`."""
+    return f"frame {frame}" + ("" if frame_rate_hz is None else f", {1e3 * (frame + 0.5) / frame_rate_hz:.2f} ms")
+
+
+def light_db(picture: Pictures, light: Pictures) -> float:
+    """PSNR [dB] of a picture against the true light (H, W), whose brightest pixel is the peak."""
+    return psnr_db(picture, light, float(light.max()) or 1.0)
 
 
 def checked_window(window: int | None, frames: int) -> int:
@@ -151,13 +179,16 @@ def _light(path: Path, row: int, shape: tuple[int, int]) -> Pictures:
     return np.asarray(light[0], np.float32)
 
 
-def restore(noisy: Spikes, online: OnlineDnSS, at: Iterable[int]) -> tuple[Spikes, dict[int, Pictures], float]:
+def restore(
+    noisy: Spikes, online: OnlineDnSS, at: Iterable[int], chunk: int = 16
+) -> tuple[Spikes, dict[int, Pictures], float]:
     """Denoise a stream.
 
     Args:
         noisy: (T, H, W) spikes.
         online: The denoiser, with output "both".
         at: Frames whose rate plane is kept: planes are four bytes a pixel.
+        chunk: Frames that are pushed at a time.
 
     Returns:
         (T, H, W) denoised spikes, rate planes (H, W) [spikes/frame] by frame in order, and the denoiser's time [s].
@@ -166,7 +197,7 @@ def restore(noisy: Spikes, online: OnlineDnSS, at: Iterable[int]) -> tuple[Spike
     planes: dict[int, Pictures] = {}
     spikes = np.empty_like(noisy)
     began = time.perf_counter()
-    for first, (fired, rates) in pieces_of(online, noisy, title="denoise"):
+    for first, (fired, rates) in pieces_of(online, noisy, chunk, title="denoise"):
         spikes[first : first + len(fired)] = fired
         planes |= {frame: plane for frame, plane in enumerate(rates, first) if frame in wanted}
     return spikes, planes, time.perf_counter() - began

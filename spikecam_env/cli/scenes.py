@@ -46,12 +46,14 @@ class Scenes:
 
     def run(self) -> None:
         from scenes.catalogue import SCENES
+        from spikecam_env.cli.files import check_place
 
         if self.name not in (None, *SCENES):
             raise unknown_name("scene", self.name, SCENES)
         if min(self.size) < 8:
             raise InputError(f"--size {self.size[0]} {self.size[1]}; at least 8 rows and 8 columns")
-        self._check_places()
+        check_place("film", self.film, ".mp4", ".gif")
+        check_place("out", self.out, ".png")
         if self.film is not None:
             self._write_film(self.film)
         if self.out is not None:
@@ -60,19 +62,8 @@ class Scenes:
             for name in (self.name,) if self.name else SCENES:
                 print(f"{name:10} {about(name)}")
 
-    def _check_places(self) -> None:
-        """Check that both files can be written, before either is made."""
-        from spikecam_env.whole import check_file
-
-        for option, path, suffixes in (("film", self.film, (".mp4", ".gif")), ("out", self.out, (".png",))):
-            if path is None:
-                continue
-            if path.suffix.lower() not in suffixes:
-                raise InputError(f"--{option} {path}: unknown file type {path.suffix!r}; use {' or '.join(suffixes)}")
-            check_file(path)
-
     def _write_film(self, path: Path) -> None:
-        from spikecam_env.cli.panels import write_film, write_gif
+        from spikecam_env.cli.screen.film import write_film, write_gif
 
         if self.name is None:
             raise InputError(f"which scene? spikecam scenes NAME --film {path}; `spikecam scenes` lists the names")
@@ -90,26 +81,27 @@ class Scenes:
         """The light that the sensor gets at these frames, white the brightest hundredth of the first picture's."""
         import numpy as np
 
-        from spikecam_env.cli.panels import display
+        from spikecam_env.cli.screen.screen import display, white_of
 
         scene, white = self._scene(self.name), None
         for frame in at:
             light = scene.radiance(frame, frame + 1).at(frame)
-            white = white or _white(light)
+            white = white or white_of(light)
             yield np.repeat(display(light, white)[..., None], 3, axis=2)
 
     def _write_sheet(self, path: Path) -> None:
         from tqdm import tqdm
 
         from scenes.catalogue import SCENES
-        from spikecam_env.cli.panels import PicturePanel, sheet, write_picture
+        from spikecam_env.cli.screen.film import write_picture
+        from spikecam_env.cli.screen.screen import PicturePanel, compose, white_of
 
         names = (self.name,) if self.name else SCENES
         panels = []
         for name in tqdm(names, desc="scenes", unit="scene", leave=False):
             light = self._scene(name).truth(SHOWN_AT).radiance
-            panels.append(PicturePanel(light / _white(light), name, about(name).partition(": ")[2]))
-        write_picture(path, sheet(panels, COLUMNS))
+            panels.append(PicturePanel(light / white_of(light), name, about(name).partition(": ")[2]))
+        write_picture(path, compose(panels, columns=COLUMNS))
         print(f"wrote {path}: {len(names)} scene{'s' if len(names) > 1 else ''}")
 
     def _scene(self, name: str | None) -> Any:
@@ -124,9 +116,3 @@ def about(name: str) -> str:
 
     described = sys.modules[SCENES[name].__module__].__doc__ or ""
     return described.splitlines()[0].partition(".  ")[0].rstrip(".")
-
-
-def _white(light: Any) -> float:
-    import numpy as np
-
-    return float(np.percentile(light, 99.5)) or 1.0

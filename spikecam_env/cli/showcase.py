@@ -9,15 +9,15 @@ from typing import Any
 import gymnasium
 import numpy as np
 from numpy.typing import NDArray
-from tqdm import tqdm
+from tqdm import trange
 
 from denoiser import OnlineDnSS
 from denoiser.evaluate.metrics import psnr_db
 from denoiser.evaluate.rows import restored
 from scenes.protocol import Gaze
 from spikecam_env.checked import checked_memory
-from spikecam_env.cli.before_after import WINDOW, instant_panel, light_db, light_panel, mean_panel, white_of
-from spikecam_env.cli.panels import PicturePanel, compose
+from spikecam_env.cli.restore import WHITE, WINDOW, DenoisedRecording, light_db, restore
+from spikecam_env.cli.screen.screen import compose, white_of
 from spikecam_env.errors import InputError
 from spikecam_env.sensor import SensorModel
 from spikecam_env.streams import middleTFI, middleTFP
@@ -38,31 +38,25 @@ TABLE_FRAMES = 250
 
 
 @dataclass(frozen=True)
-class Streamed:
-    """One run; streams are (T, H, W)."""
+class Streamed(DenoisedRecording):
+    """One run; planes and true light are of the middle frame of each block."""
 
-    mode: str
     frame_rate_hz: float
-    noisy: Spikes
+    mode: str
     clean: Spikes
-    denoised: Spikes
-    planes: list[Pictures]
-    """Rate planes (H, W) of the middle frames of blocks."""
-    truths: list[Pictures]
-    """True light (H, W) of the same frames."""
+    """(T, H, W) of the clean twin."""
     camera_s: float
-    denoiser_s: float
-    latency: int
+    """That scene and camera took."""
 
     @property
     def times_real(self) -> float:
         """The camera's time over the time it took, scene, camera and denoiser together."""
-        return len(self.noisy) / self.frame_rate_hz / (self.camera_s + self.denoiser_s)
+        return len(self.noisy) / self.frame_rate_hz / (self.camera_s + self.seconds)
 
     @property
-    def shown(self) -> range:
-        """Blocks to show."""
-        return range(FIRST_SHOWN, len(self.truths) - LAST_SHOWN)
+    def shown(self) -> list[int]:
+        """Frames to show."""
+        return list(self.light)[FIRST_SHOWN:-LAST_SHOWN]
 
 
 def stream(
@@ -99,44 +93,23 @@ def stream(
     online = OnlineDnSS.pretrained(mode, output="both")
     _compile(env, online, shape)
     still = np.zeros(2, np.float32)
-    noisy: list[Spikes] = []
-    clean: list[Spikes] = []
-    denoised: list[Spikes] = []
-    planes: list[Pictures] = []
-    truths: list[Pictures] = []
-    camera_s = denoiser_s = 0.0
-    blocks = -(-frames // BLOCK)
-    for step in tqdm(range(blocks + 1), desc="stream", unit="block", leave=False):
+    noisy, clean = (np.empty((-(-frames // BLOCK) * BLOCK, *shape), np.uint8) for _ in range(2))
+    light, camera_s = {}, 0.0
+    for first in trange(0, frames, BLOCK, desc="stream", unit="block", leave=False):
         began = time.perf_counter()
-        if step == 0:
-            block, _ = env.reset(seed=seed, options=start)
-            twin = camera.sensor.clean_twin()
-        elif step < blocks:
-            block, *_ = env.step(still)
-        shot = time.perf_counter()
-        fired, rates = online.push(block) if step < blocks else online.flush()
-        camera_s, denoiser_s = camera_s + shot - began, denoiser_s + time.perf_counter() - shot
-        ready = sum(len(part) for part in denoised)
-        planes += [rate for frame, rate in enumerate(rates, ready) if frame % BLOCK == BLOCK // 2]
-        denoised.append(fired)
-        if step < blocks:
-            gaze = Gaze((0.0, 0.0), (0.0, 0.0), (twin.frame, twin.frame + BLOCK))
-            truths.append(camera.scene.truth(twin.frame + BLOCK / 2, gaze).radiance)
-            clean.append(twin.step(camera.scene.radiance(*gaze.frames, gaze), BLOCK))
-            noisy.append(block.view(np.uint8))
+        block = env.step(still)[0] if first else env.reset(seed=seed, options=start)[0]
+        camera_s += time.perf_counter() - began
+        noisy[first : first + BLOCK] = block.view(np.uint8)
+    twin = camera.sensor.clean_twin()
+    for first in range(0, frames, BLOCK):
+        gaze = Gaze((0.0, 0.0), (0.0, 0.0), (first, first + BLOCK))
+        light[first + BLOCK // 2] = camera.scene.truth(first + BLOCK / 2, gaze).radiance
+        clean[first : first + BLOCK] = twin.step(camera.scene.radiance(*gaze.frames, gaze), BLOCK)
     frame_rate_hz = camera.model.frame_rate_hz
     env.close()
+    denoised, planes, seconds = restore(noisy, online, light, BLOCK)
     return Streamed(
-        mode=mode,
-        frame_rate_hz=frame_rate_hz,
-        noisy=np.concatenate(noisy),
-        clean=np.concatenate(clean),
-        denoised=np.concatenate(denoised),
-        planes=planes,
-        truths=truths,
-        camera_s=camera_s,
-        denoiser_s=denoiser_s,
-        latency=online.latency,
+        noisy, denoised, planes, light, WINDOW, frame_rate_hz, seconds, online.latency, mode, clean, camera_s
     )
 
 
@@ -154,28 +127,11 @@ def _camera(
     return env, start | ({"seed": seed} if scene == "random" else {})
 
 
-def film_frames(run: Streamed) -> list[NDArray[np.uint8]]:
-    """One picture a shown block: noisy, denoised, true light, with PSNR against the true light."""
-    return [_picture(run, block) for block in run.shown]
-
-
-def last_picture(run: Streamed) -> NDArray[np.uint8]:
-    """The last block that is shown, as `film_frames` has it: the denoiser has seen most before it."""
-    return _picture(run, run.shown[-1])
-
-
-def _picture(run: Streamed, block: int) -> NDArray[np.uint8]:
-    corner = f"{run.mode}: denoised online, {run.latency} frames later"
-    return compose(_panels(run, block), white_of(run.truths[0]), corner)
-
-
-def _panels(run: Streamed, block: int) -> list[PicturePanel]:
-    frame, light = block * BLOCK + BLOCK // 2, run.truths[block]
-    return [
-        mean_panel("noisy spikes", run.noisy, frame, WINDOW, light),
-        instant_panel("denoised rate", run.planes[block], light),
-        light_panel(light, frame, run.frame_rate_hz),
-    ]
+def picture(run: Streamed, frame: int) -> NDArray[np.uint8]:
+    """The screen at a frame of `run.shown`: noisy, denoised, true light, with PSNR against the true light."""
+    noisy, _, rate, light = run.panels(frame)
+    white = white_of(next(iter(run.light.values())), WHITE)
+    return compose([noisy, rate, light], white, corner=f"{run.mode}: denoised online, {run.latency} frames later")
 
 
 def comparison(run: Streamed) -> list[dict[str, Any]]:
@@ -188,30 +144,32 @@ def comparison(run: Streamed) -> list[dict[str, Any]]:
     Returns:
         Rows of noisy, denoised in both modes, and clean twin.
     """
-    first = max(FIRST_SHOWN, (len(run.truths) - TABLE_FRAMES // BLOCK) // 2)
-    stretch = slice(first * BLOCK, first * BLOCK + TABLE_FRAMES)
-    noisy, clean = run.noisy[stretch], run.clean[stretch]
+    first = BLOCK * max(FIRST_SHOWN, (len(run.light) - TABLE_FRAMES // BLOCK) // 2)
+    noisy, clean = (spikes[first : first + TABLE_FRAMES] for spikes in (run.noisy, run.clean))
     streams: dict[str, tuple[Spikes, Pictures | None]] = {"noisy": (noisy, None)}
     for mode in ("paper", "best"):
         online = OnlineDnSS.pretrained(mode, output="both")
         streams[mode] = restored(online, noisy, f"compare ({mode})")[:2]
     streams["clean twin"] = (clean, None)
-    middles = [b * BLOCK + BLOCK // 2 for b in range(2, len(noisy) // BLOCK - 2)]
     rows = []
     for name, (spikes, planes) in streams.items():
-        row: dict[str, Any] = {"stream": name}
-        scores: dict[str, list[float]] = {}
-        for at in middles:
-            truth = run.truths[first + at // BLOCK]
-            peak = float(truth.max())
+        scores = []
+        for at in range(2 * BLOCK + BLOCK // 2, len(noisy) - 2 * BLOCK, BLOCK):
             one = middleTFI(spikes, at) if planes is None else planes[at]
-            scores.setdefault("instant, light", []).append(light_db(one, truth))
-            for window in (21, WINDOW):
-                picture, twin = middleTFP(spikes, at, window), middleTFP(clean, at, window)
-                scores.setdefault(f"TFP {window}, light", []).append(light_db(picture, truth))
-                scores.setdefault(f"TFP {window}, twin", []).append(psnr_db(picture, twin, peak))
-        rows.append(row | {measure: float(np.mean(values)) for measure, values in scores.items()})
+            scores.append(_scores(one, spikes, clean, at, run.light[first + at]))
+        means = {measure: float(np.mean([score[measure] for score in scores])) for measure in scores[0]}
+        rows.append({"stream": name, **means})
     return rows
+
+
+def _scores(one: Pictures, spikes: Spikes, clean: Spikes, at: int, light: Pictures) -> dict[str, float]:
+    """PSNR [dB] by column of `comparison`: of one instant's picture, and of means about a frame of a stream."""
+    scores = {"instant, light": light_db(one, light)}
+    for window in (21, WINDOW):
+        mean, twin = middleTFP(spikes, at, window), middleTFP(clean, at, window)
+        scores[f"TFP {window}, light"] = light_db(mean, light)
+        scores[f"TFP {window}, twin"] = psnr_db(mean, twin, float(light.max()))
+    return scores
 
 
 def _compile(env: gymnasium.Env, online: OnlineDnSS, shape: tuple[int, int]) -> None:

@@ -80,16 +80,12 @@ class ViewCommand:
         print(f"wrote {self.save}; `rerun {self.save}` shows it")
 
     def _check_place(self) -> None:
-        from spikecam_env.cli.live.window import has_display
-        from spikecam_env.whole import check_file
+        from spikecam_env.cli.files import check_place
+        from spikecam_env.cli.screen.window import has_display
 
-        if self.save is None:
-            if not has_display():
-                raise InputError(f"there is no display for rerun's viewer; write a file with --save FILE{ENDING}")
-            return
-        if self.save.suffix.lower() != ENDING:
-            raise InputError(f"--save {self.save}: unknown file type {self.save.suffix!r}; use {ENDING}")
-        check_file(self.save)
+        if self.save is None and not has_display():
+            raise InputError(f"there is no display for rerun's viewer; write a file with --save FILE{ENDING}")
+        check_place("save", self.save, ENDING)
 
     @contextmanager
     def _stream(self) -> Iterator[Stream]:

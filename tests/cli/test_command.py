@@ -203,7 +203,7 @@ def test_a_quick_demo_makes_a_picture_alone(tmp_path: Path, capsys) -> None:
 )
 def test_what_is_wrong_ends_in_one_line_and_code_2(args, message: str, tmp_path: Path, monkeypatch, capsys) -> None:
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr("spikecam_env.cli.live.window.has_display", lambda: False)
+    monkeypatch.setattr("spikecam_env.cli.screen.window.has_display", lambda: False)
     Path("odd.dat").write_bytes(bytes(12345))
     Path("good.dat").write_bytes(bytes(12500 * 50))
     Path("text.npz").write_text("not an array")

@@ -11,7 +11,7 @@ from PIL import Image
 
 from denoiser import denoise
 from denoiser.evaluate.metrics import psnr_db
-from spikecam_env.cli.panels import MARGIN, panel_scale
+from spikecam_env.cli.screen.screen import MARGIN, panel_scale
 from spikecam_env.streams import SpikeWriter, middleTFP, read_recording, read_truth, save_npz, save_vidar_dat
 from tests.commands import film_in, picture_in, spikecam
 
@@ -126,10 +126,10 @@ def test_light_of_another_size_is_refused_in_a_line(tmp_path: Path, capsys) -> N
 
 
 def test_the_demo_says_of_how_many_frames_each_picture_is(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    from spikecam_env.cli import panels
+    from spikecam_env.cli.screen import screen
 
     written: list[str] = []
-    monkeypatch.setattr(panels.ImageDraw.ImageDraw, "text", lambda self, at, text, *_, **__: written.append(text))
+    monkeypatch.setattr(screen.ImageDraw.ImageDraw, "text", lambda self, at, text, *_, **__: written.append(text))
     assert spikecam("demo", "--quick", "--size", *SHAPE, "--no-open", "--out", tmp_path) == 0
     assert Image.open(tmp_path / "demo.png").size[0] > 0
     said = " | ".join(written)

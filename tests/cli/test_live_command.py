@@ -16,7 +16,7 @@ import pytest
 from scenes import RotatingDisk
 from spikecam_env.cli.live.live_screen import LiveScreen
 from spikecam_env.cli.live.simulated import SimulatedSource
-from spikecam_env.cli.panels import MARGIN, display
+from spikecam_env.cli.screen.screen import MARGIN, display
 from spikecam_env.sensor import SpikeSensor
 from spikecam_env.streams import pack_frames, save_vidar_dat
 from spikecam_env.streams.sources import StoredFrames
@@ -30,7 +30,7 @@ SCALE = 8
 
 @pytest.fixture(autouse=True)
 def no_display(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    monkeypatch.setattr("spikecam_env.cli.live.window.has_display", lambda: False)
+    monkeypatch.setattr("spikecam_env.cli.screen.window.has_display", lambda: False)
     monkeypatch.chdir(tmp_path)
 
 
@@ -174,9 +174,8 @@ def test_in_a_window_escape_ends_an_endless_stream(recording: Path, monkeypatch:
     class Window:
         closed = False
 
-        def __init__(self, title: str, picture: np.ndarray, held: set[str]) -> None:
+        def __init__(self, title: str) -> None:
             assert title == "spikecam live disk.dat"
-            shown.append(picture)
 
         def show(self, picture: np.ndarray, seconds: float) -> None:
             shown.append(picture)
@@ -187,8 +186,8 @@ def test_in_a_window_escape_ends_an_endless_stream(recording: Path, monkeypatch:
         def taken(self) -> list[str]:
             return ["escape"] if len(shown) > 3 else []
 
-    monkeypatch.setattr("spikecam_env.cli.live.window.has_display", lambda: True)
-    monkeypatch.setattr("spikecam_env.cli.live.window.DisplayWindow", Window)
+    monkeypatch.setattr("spikecam_env.cli.screen.window.has_display", lambda: True)
+    monkeypatch.setattr("spikecam_env.cli.screen.window.DisplayWindow", Window)
     assert spikecam("live", recording, "--loop", "--speed", 0.05) == 0
     assert len(shown) == 4 and len({picture.shape for picture in shown}) == 1
     assert figures(capsys.readouterr().out)["pictures"] >= 4
@@ -211,7 +210,7 @@ def test_a_simulated_source_gives_the_sensors_frames(spikes: np.ndarray) -> None
 
 def test_the_screen_shows_grey_values_of_a_screen_and_follows_the_light() -> None:
     rng = np.random.default_rng(0)
-    screen, rate = LiveScreen(SHAPE, "disk", "best"), rng.random(SHAPE).astype(np.float32)
+    screen, rate = LiveScreen("disk", "best"), rng.random(SHAPE).astype(np.float32)
     rows, columns = SHAPE[0] * SCALE, SHAPE[1] * SCALE
 
     def panels(light: float) -> tuple[np.ndarray, np.ndarray]:

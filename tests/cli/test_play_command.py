@@ -12,19 +12,20 @@ import numpy as np
 import pytest
 
 from denoiser import OnlineDnSS
-from spikecam_env.cli.live.episodes import environment, episode, most_seconds, pictures_due
+from spikecam_env.cli.live.episode_screen import EpisodeScreen
+from spikecam_env.cli.live.episodes import Moment, environment, episode, most_seconds, pictures_due
 from spikecam_env.cli.live.filming import watch
-from spikecam_env.cli.live.keys import action_of, explained, plain
-from spikecam_env.cli.live.pictures import Denoised, Noisy
+from spikecam_env.cli.live.keys import action_of, explained
 from spikecam_env.cli.live.players import Player, player, steering
-from spikecam_env.cli.live.screen import AIM, TARGET, Screen
+from spikecam_env.cli.screen.screen import AIM, TARGET
+from spikecam_env.cli.screen.window import plain
 from spikecam_env.envs.score import BASELINES, play
 from tests.commands import film_in, spikecam
 
 
 @pytest.fixture(autouse=True)
 def no_display(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    monkeypatch.setattr("spikecam_env.cli.live.window.has_display", lambda: False)
+    monkeypatch.setattr("spikecam_env.cli.screen.window.has_display", lambda: False)
     monkeypatch.chdir(tmp_path)
 
 
@@ -139,7 +140,7 @@ def played(script: dict[int, str], seeds: Iterator[int] | range, name: str = "Tr
     user = Player(steering(held))
     env = environment(name, user, split="test")
     window = Acted(script, held)
-    ended = watch(env, user, Screen("task", "me"), seeds, 40.0, lambda _: window)
+    ended = watch(env, user, EpisodeScreen("task", "me"), seeds, 40.0, window)
     return window, ended, env
 
 
@@ -174,14 +175,16 @@ def test_a_moment_is_of_the_step_it_says() -> None:
 def test_pictures_are_the_share_of_the_last_frames_and_the_newest_plane() -> None:
     rng = np.random.default_rng(0)
     blocks = (rng.random((6, 20, 16, 16)) < 0.3).astype(np.uint8)
-    noisy, denoised = Noisy(), Denoised()
-    seen = [(noisy.push(block), denoised.push(block)) for block in blocks]
-    np.testing.assert_allclose(seen[-1][0], blocks[-2:].reshape(40, 16, 16).mean(axis=0), atol=1e-6)
+    screen = EpisodeScreen("task", "me", denoise=True)
+    for step, block in enumerate(blocks):
+        screen.see(Moment(0, step, 20 * (step + 1), 0.0, block, 0.0, 0.0, {}, False))
+        assert (screen.denoised is None) == (step == 0)
+    np.testing.assert_allclose(screen.noisy, blocks[-2:].reshape(40, 16, 16).mean(axis=0), atol=1e-6)
     planes = OnlineDnSS.pretrained("best", output="rate").push(blocks.reshape(120, 16, 16))
-    assert seen[0][1] is None
-    np.testing.assert_array_equal(seen[-1][1], planes[-1])
-    denoised.begin()
-    assert denoised.push(blocks[0]) is None
+    np.testing.assert_array_equal(screen.denoised, planes[-1])
+    screen.see(Moment(1, 0, 20, 0.0, blocks[0], 0.0, 0.0, {}, False))
+    assert screen.denoised is None
+    np.testing.assert_allclose(screen.noisy, blocks[0].mean(axis=0), atol=1e-6)
 
 
 def test_the_target_is_marked_where_it_is_and_only_where_asked() -> None:
@@ -189,7 +192,7 @@ def test_the_target_is_marked_where_it_is_and_only_where_asked() -> None:
     moment = next(episode(env, player("nothing"), 0))
 
     def places(colour: tuple[int, int, int], **options: Any) -> np.ndarray:
-        screen = Screen("Track-v1", "nothing", **options)
+        screen = EpisodeScreen("Track-v1", "nothing", **options)
         screen.see(moment)
         return np.argwhere((screen.picture(moment) == colour).all(axis=-1))
 

@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 
 from scenes.catalogue import SCENES
-from spikecam_env.cli.panels import BACKGROUND, MARGIN, PicturePanel, compose, write_film
+from spikecam_env.cli.screen.film import write_film
+from spikecam_env.cli.screen.screen import BACKGROUND, MARGIN, PicturePanel, compose
 from spikecam_env.streams import read_recording
 from tests.commands import film_in, picture_in, spikecam
 

@@ -15,7 +15,7 @@ from denoiser import OnlineDnSS
 from scenes.catalogue import make_scene
 from spikecam_env.cli.live.streams import Block, Stream, of_recording, of_scene
 from spikecam_env.cli.live.timeline import DENOISED, NOISY, TARGET, TimelineEntry, entries
-from spikecam_env.cli.panels import display
+from spikecam_env.cli.screen.screen import display
 from spikecam_env.sensor import SpikeSensor
 from spikecam_env.streams import save_npz
 from tests.commands import spikecam

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from spikecam_env.cli.main import run
-from spikecam_env.cli.panels import write_film, write_picture
+from spikecam_env.cli.screen.film import write_film, write_picture
 
 SIZE = "--size 24 40"
 SMALL = {

@@ -88,9 +88,16 @@ def _film(*_: object) -> list[np.ndarray]:
     return [np.random.default_rng(i).integers(0, 255, (48, 80, 3), dtype=np.uint8) for i in range(12)]
 
 
+def _watched(*given: object) -> list[object]:
+    *_, end = given
+    for picture in _film():
+        end.show(picture, 0.04)
+    return []
+
+
 def _streamed(**_: object) -> SimpleNamespace:
     return SimpleNamespace(
-        noisy=np.zeros(10), frame_rate_hz=4e4, camera_s=1.0, denoiser_s=1.0, times_real=1.0, latency=31
+        noisy=np.zeros(10), frame_rate_hz=4e4, camera_s=1.0, seconds=1.0, times_real=1.0, latency=31, shown=range(12)
     )
 
 
@@ -99,8 +106,7 @@ FILM: Work = {"scenes:VideoScene": VideoScene}
 MODEL = SensorModel.preset("scsim")
 DEMO: Work = {
     "spikecam_env.cli.showcase:stream": _streamed,
-    "spikecam_env.cli.showcase:film_frames": _film,
-    "spikecam_env.cli.showcase:last_picture": lambda _: _film()[0],
+    "spikecam_env.cli.showcase:picture": lambda _, frame: _film()[frame],
     "spikecam_env.cli.showcase:comparison": lambda _: [{"stream": "noisy"}],
 }
 TRAINING: Work = {"denoiser.training.simulated:Bank.drawn": _bank}
@@ -120,7 +126,7 @@ TRUTH: Work = {
 }
 TASKS: Work = {"spikecam_env.envs.score:baselines": lambda *_, **__: [{"task": "x" * 9000}]}
 LIVE: Work = {"denoiser.live.session:Session": Session}
-PLAYED: Work = {"spikecam_env.cli.live.filming:pictures": _film}
+PLAYED: Work = {"spikecam_env.cli.live.filming:watch": _watched}
 VIEWED: Work = {"spikecam_env.cli.live.rerun_log:recorded": lambda *_: bytes(9000)}
 CALIBRATION: Work = {"spikecam_env.calibration:calibrate": cache(calibrate)}
 DIAGNOSIS: Work = {"spikecam_env.gap.diagnose:diagnose": lambda *_, **__: made_up._plain("none", "No gap.")}

@@ -30,12 +30,6 @@ ANSWERS = tuple("0123456789")
 STEERING = (*TURNS, *FURTHER, *ANSWERS)
 
 
-def plain(key: str | None) -> str:
-    """A key's name without shift and the like: `shift+LEFT` and `left` steer alike."""
-    name = (key or "").rpartition("+")[2].lower()
-    return "space" if name == " " else name
-
-
 def action_of(held: Iterable[str], axes: int, further: int, answers: int = 0) -> NDArray[np.float32]:
     """The action of the keys that are held down.
 

@@ -18,14 +18,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from spikecam_env.cli.live.streams import Block, Stream
-from spikecam_env.cli.panels import display
+from spikecam_env.cli.screen.screen import BRIGHT_PERCENT, display
 from spikecam_env.errors import InputError, shown
 
 NOISY, DENOISED = "picture/noisy", "picture/denoised"
 TARGET = f"{NOISY}/target"
 RATES = "rate [spikes a frame]"
-BRIGHT_PERCENT = 99.5
-"""Of the pixels of the first noisy picture, these at least are darker than white."""
 
 Pixel = tuple[int, int]
 """(row, column)."""

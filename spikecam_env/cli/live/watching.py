@@ -1,30 +1,27 @@
-"""A live session as it is shown: in a window, as a film, or as a line of figures."""
+"""A live session as it is shown: on a screen, in a window or a film, or as a line of figures."""
 
 from __future__ import annotations
 
 import sys
 import time
 import warnings
-from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from denoiser.live.session import NOTHING, PICTURES_S, Session, Shown
-from spikecam_env.cli.encoder import encoder
+from denoiser.live.session import NOTHING, Session, Shown
 from spikecam_env.cli.live.live_screen import LiveScreen
+from spikecam_env.cli.screen.window import End
 from spikecam_env.errors import InputError
 from spikecam_env.streams.geometry import geometry_doubt
 from spikecam_env.streams.sources import Flowing, Source
-from spikecam_env.whole import whole_file
 
 PROBE = 256
 """Frames of a pipe or a socket that are asked whether their geometry is right, once there are so many."""
 STATUS_S = 1.0
 """From one status line to the next [s]."""
 IDLE_S = 0.02
-"""For which a window and a film are left as they are while there is no other picture [s]."""
+"""For which the next picture is waited for before a window and a film go on with the last [s]."""
 
 
 class Watching:
@@ -32,7 +29,7 @@ class Watching:
 
     def __init__(self, session: Session, source: Source, mode: str) -> None:
         self._session, self._source = session, source
-        self._screen = LiveScreen(source.shape, source.title, mode)
+        self._screen = LiveScreen(source.title, mode)
         self._shown: Shown | None = None
         self._lately, self._before = NOTHING, NOTHING
         self._line_s = time.perf_counter()
@@ -43,33 +40,19 @@ class Watching:
         while not self._session.over:
             self._next(STATUS_S)
 
-    def as_a_film(self, film: Path) -> None:
-        """Write a film of PICTURES_S pictures a second; one that is late is the one before, again."""
-        while not self._session.over and self._shown is None:
-            self._next(IDLE_S)
-        picture = self._picture()
-        with whole_file(film) as beside, encoder(beside, picture.shape[:2], PICTURES_S) as add:
-            add(picture)
-            begun_s, count = time.perf_counter(), 1
-            while not self._session.over:
-                if self._next(IDLE_S):
-                    picture = self._picture()
-                while count < (time.perf_counter() - begun_s) * PICTURES_S:
-                    add(picture)
-                    count += 1
-
-    def in_a_window(self) -> None:
-        """Until it is closed, or Esc is pressed."""
-        from spikecam_env.cli.live.window import DisplayWindow
-
-        while not self._session.over and self._shown is None:
-            self._next(IDLE_S)
-        window = DisplayWindow(f"spikecam live {self._source.title}", self._picture(), set())
-        while not (self._session.over or window.closed or "escape" in window.taken()):
-            if self._next(0.0):
-                window.show(self._picture(), 0.0)
+    def on_screen(self, end: End) -> None:
+        """Every picture as it comes, for as long as it is the newest; until the window is closed, or Esc is pressed."""
+        then = time.perf_counter()
+        while not (self._session.over or end.closed or "escape" in end.taken()):
+            shown, now = self._next(IDLE_S), time.perf_counter()
+            if shown is not None:
+                picture = self._screen.picture(shown.noisy, shown.rate, str(self._lately))
+                end.show(picture, now - then)
             else:
-                window.wait(IDLE_S)
+                end.wait(now - then)
+            then = now
+        if self._shown is None:
+            raise self._too_short()
 
     def summary(self) -> dict[str, Any]:
         """Counts and latencies as a row; warns where the stream was cut, raises InputError where it had no picture."""
@@ -91,8 +74,8 @@ class Watching:
             "latency [ms]": figures.latency_ms,
         }
 
-    def _next(self, timeout_s: float) -> bool:
-        """Wait for another picture, and look after the status line; whether there is one."""
+    def _next(self, timeout_s: float) -> Shown | None:
+        """Wait for another picture, and look after the status line."""
         shown = self._session.newest(self._shown, timeout_s)
         self._shown = shown or self._shown
         now = time.perf_counter()
@@ -103,12 +86,7 @@ class Watching:
         if self._doubtful and (self._session.figures.frames >= PROBE or self._session.over):
             self._doubtful = False
             self._look_at_geometry()
-        return shown is not None
-
-    def _picture(self) -> NDArray[np.uint8]:
-        if self._shown is None:
-            raise self._too_short()
-        return self._screen.picture(self._shown.noisy, self._shown.rate, str(self._lately))
+        return shown
 
     def _too_short(self) -> InputError:
         frames = self._session.figures.frames

@@ -1,0 +1,1 @@
+"""Pictures of streams, and their two ends: a window, or a film."""
