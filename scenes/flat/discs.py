@@ -12,7 +12,7 @@ from functools import cached_property
 
 import numpy as np
 
-from scenes.flat.painted_disk import PlacedDisc, Plane, Texels
+from scenes.flat.painted_disk import PlacedDisc, Plane, Texels, Tile
 from scenes.flat.planes import MovingDisc, PlanarScene
 from scenes.protocol import Gaze
 from spikecam_env.compiled import njit
@@ -118,7 +118,11 @@ class Discs(PlanarScene):
             x, y = disc.path.along(frame)
             angle = disc.angle + disc.turn(self.frame_rate_hz) * frame
             laid.append(PlacedDisc(disc.texels, disc.radius, x - pan, y - tilt, angle))
-        return Plane(self.shape, frame, self.tile, pan, tilt, laid)
+        return Plane(self.shape, frame, self._tile, pan, tilt, laid)
+
+    @cached_property
+    def _tile(self) -> Tile:
+        return Tile.of(self.tile, self.shape)
 
     @cached_property
     def _speed(self) -> float:

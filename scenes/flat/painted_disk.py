@@ -51,6 +51,49 @@ class Texels:
         return replace(self, low=self.low * np.float32(gain), step=self.step * np.float32(gain))
 
 
+@dataclass(frozen=True, eq=False)
+class Tile:
+    """A background that repeats without end, as the processor reads it fastest: samples a pixel apart are neighbours."""
+
+    samples: Pictures
+    """(h, step, n) float32: sample (row, s) stands at [row, s % step, s // step], on and on over the period's end for
+    as many columns as a picture has from any sample."""
+    period: int
+    """Samples after which a row repeats."""
+    unmoved: Pictures
+    """(rows, columns) float32, the picture seen from (0, 0)."""
+
+    @classmethod
+    def of(cls, samples: Pictures, shape: tuple[int, int], step: int = 1) -> Tile:
+        """The tile behind a picture.
+
+        Args:
+            samples: (h, period) float32 radiance.
+            shape: (rows, columns) of the picture.
+            step: samples from pixel to pixel.
+        """
+        height, period = samples.shape
+        pixels = np.arange(np.lcm(period, step) // step + shape[1])
+        by_phase = np.ascontiguousarray(samples[:, (step * pixels + np.arange(step)[:, None]) % period])
+        unmoved = by_phase[step * np.arange(shape[0]) % height, 0, : shape[1]]
+        return cls(by_phase, period, np.ascontiguousarray(unmoved))
+
+    def lit(self, gain: float) -> Tile:
+        """The same with `gain` times its light."""
+        by = np.float32(gain)
+        return replace(self, samples=self.samples * by, unmoved=self.unmoved * by)
+
+    @property
+    def step(self) -> int:
+        """Samples from pixel to pixel."""
+        return self.samples.shape[1]
+
+    def in_order(self) -> Pictures:
+        """(h, period), the samples as `of` takes them."""
+        place = np.arange(self.period)
+        return self.samples[:, place % self.step, place // self.step]
+
+
 class PlacedDisc(NamedTuple):
     """A disc at each key."""
 
@@ -71,15 +114,13 @@ class Plane:
     shape: tuple[int, int]
     frame: Floats
     """(K,) frames of the keys, rising."""
-    tile: Pictures
-    """(h, w) radiance of the background, repeated."""
+    tile: Tile
+    """The background."""
     pan: Floats
     tilt: Floats
-    """pan and tilt (K,), offset from which the background is seen [pixels]."""
+    """pan and tilt (K,), place from which the background is seen [samples]."""
     discs: Sequence[PlacedDisc]
     """From the back."""
-    unmoved: Pictures | None = None
-    """(rows, columns), the background seen from (0, 0), where it is known."""
 
 
 def places_of(side: Floats, radius: Floats, x: Floats, y: Floats, angle: Floats) -> Floats:
@@ -139,10 +180,8 @@ KEYS = 64
 So the texels of a band are read again while they are in the processor's second cache (0.6 MB for the default disk).
 Key by key the whole texture, 5 MB, would pass through it each time."""
 
-_TILE, _TILE_ROWS, _TILE_COLUMNS, _ROWS, _COLUMNS, _UNMOVED, _OUT, _SIZE, _KEYS, _FIRST_KEY, _FIRST_DISC, _STOP_DISC = (
-    range(12)
-)
-_FIRST_PART = 12
+_TILE, _TILE_ROWS, _STEP, _TILE_COLUMNS, _PERIOD, _UNMOVED, _ROWS, _COLUMNS, _OUT, _SIZE, _KEYS, _FIRST_KEY = range(12)
+_FIRST_DISC, _STOP_DISC, _FIRST_PART = 12, 13, 14
 """Columns of the table of scenes."""
 
 
@@ -166,10 +205,10 @@ def paint_scenes(
 
     Args:
         tickets: (1, 8) int64, shared: [0, 0] is the next part, of `parts`.
-        scenes: (N, 13) int64: address, rows and columns of the tile; rows and columns of the picture; address of the
-            tile as seen from (0, 0), or 0; address of the first picture, bytes to the next, how many there are, the
-            first one's number; the scene's disks, from and to; its first part (`parts_of`).
-        pan: (M,) offset from which the tile is seen, a picture after another.
+        scenes: (N, 15) int64: address, shape and period of the tile's samples, address of its unmoved picture; rows and
+            columns of the picture; address of the first picture, bytes to the next, how many there are, the first
+            one's number; the scene's disks, from and to; its first part (`parts_of`).
+        pan: (M,) place from which the tile is seen [samples], a picture after another.
         tilt: (M,) likewise.
         textures: (D, 3) int64: address of the texels (`Texels`), their side, row of `places` of the first picture.
         numbers: (D, 3): radius, low, step.
@@ -195,12 +234,13 @@ def paint_scenes(
             left = 0
             for d in range(scene[_FIRST_DISC], scene[_STOP_DISC]):
                 left += _in_view(places[textures[d, 2] + key], numbers[d, 0], top, bottom, columns)
-            if scene[_UNMOVED] and left and pan[m] == 0.0 and tilt[m] == 0.0:
+            if left and pan[m] == 0.0 and tilt[m] == 0.0:
                 behind = carray(pointer_to(scene[_UNMOVED], np.float32), (rows, columns))[top:bottom]
             else:
                 behind = spare if left % 2 else picture
-                tile = carray(pointer_to(scene[_TILE], np.float32), (scene[_TILE_ROWS], scene[_TILE_COLUMNS]))
-                paint_tile(tile, pan[m], tilt[m], top, behind)
+                stored = scene[_TILE_ROWS], scene[_STEP], scene[_TILE_COLUMNS]
+                samples = carray(pointer_to(scene[_TILE], np.float32), stored)
+                _paint_tile(samples, scene[_PERIOD], pan[m], tilt[m], top, behind)
             for d in range(scene[_FIRST_DISC], scene[_STOP_DISC]):
                 x, y, u, v, cosine, sine = places[textures[d, 2] + key]
                 radius, low, step = numbers[d]
@@ -222,21 +262,22 @@ def _in_view(place: Floats, radius: float, top: int, bottom: int, columns: int) 
 
 
 @njit(cache=True, nogil=True)
-def paint_tile(tile: Pictures, pan: float, tilt: float, above: int, picture: Pictures) -> None:
-    """Rows from `above` on of the repeated tile seen from offset (pan, tilt), bilinear."""
-    height, width = tile.shape
-    left, top = int(np.floor(pan)), int(np.floor(tilt))
-    right_share, lower_share = np.float32(pan - left), np.float32(tilt - top)
-    top += above
-    column = (left + np.arange(picture.shape[1] + 1)) % width
-    mixed = np.empty(picture.shape[1] + 1, np.float32)
-    for r in range(picture.shape[0]):
-        upper, lower = (top + r) % height, (top + r + 1) % height
-        for c in range(len(mixed)):
-            above = tile[upper, column[c]]
-            mixed[c] = above + lower_share * (tile[lower, column[c]] - above)
-        for c in range(picture.shape[1]):
-            picture[r, c] = mixed[c] + right_share * (mixed[c + 1] - mixed[c])
+def _paint_tile(samples: Pictures, period: int, x: float, y: float, above: int, picture: Pictures) -> None:
+    """Rows from `above` on of the picture whose first pixel is sample (x, y) of a `Tile`, bilinear."""
+    (height, step, _), (rows, columns) = samples.shape, picture.shape
+    left, top = int(np.floor(x)), int(np.floor(y))
+    right_share, lower_share = np.float32(x - left), np.float32(y - top)
+    left, top = left % period, top + step * above
+    here, place = left % step, left // step
+    right, beside = (left + 1) % step, (left + 1) // step
+    for r in range(rows):
+        upper, lower, row = samples[(top + step * r) % height], samples[(top + step * r + 1) % height], picture[r]
+        upper_left, upper_right = upper[here, place : place + columns], upper[right, beside : beside + columns]
+        lower_left, lower_right = lower[here, place : place + columns], lower[right, beside : beside + columns]
+        for c in range(columns):
+            to_left = upper_left[c] + lower_share * (lower_left[c] - upper_left[c])
+            to_right = upper_right[c] + lower_share * (lower_right[c] - upper_right[c])
+            row[c] = to_left + right_share * (to_right - to_left)
 
 
 @njit(cache=True, nogil=True, fastmath=True)

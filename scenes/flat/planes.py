@@ -118,10 +118,10 @@ def paint_planes(planes: Sequence[Plane], light: Sequence[Pictures], threads: in
     done = keys = rows = parts = 0
     scenes, textures, numbers = [], [], []
     for plane, pictures in zip(planes, light, strict=True):
-        unmoved = 0 if plane.unmoved is None else address_of(plane.unmoved)
-        into = address_of(pictures), pictures.strides[0], len(pictures), keys
+        tile, into = plane.tile, (address_of(pictures), pictures.strides[0], len(pictures), keys)
+        behind = address_of(tile.samples), *tile.samples.shape, tile.period, address_of(tile.unmoved)
         of_scene = done, done + len(plane.discs)
-        scenes.append((address_of(plane.tile), *plane.tile.shape, *plane.shape, unmoved, *into, *of_scene, parts))
+        scenes.append((*behind, *plane.shape, *into, *of_scene, parts))
         for disc in plane.discs:
             texels = disc.texels
             textures.append((address_of(texels.pairs), texels.side, rows))

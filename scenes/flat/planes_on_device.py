@@ -88,7 +88,8 @@ class PlanePainter:
 
     def __init__(self, plane: Plane, device: torch.device) -> None:
         self._shape, self._device = plane.shape, device
-        self._tile = uploaded(plane.tile, device)
+        self._tile = uploaded(plane.tile.samples, device, lambda _: plane.tile.in_order())
+        self._step = plane.tile.step
         self._discs = [(_bits(disc.texels, device), disc.texels, disc.radius) for disc in plane.discs]
 
     def painted(self, planes: Sequence[Plane]) -> Tensor:
@@ -111,7 +112,7 @@ class PlanePainter:
 
     def paint(self, numbers: Tensor, still: bool = False) -> Tensor:
         """(K, H, W) light, from `numbers` on the device; with `still` the tile lies in each key as in the first."""
-        picture = tile_on(self._tile, numbers[:1] if still else numbers, self._shape)
+        picture = tile_on(self._tile, numbers[:1] if still else numbers, self._shape, self._step)
         for d, (bits, texels, radius) in enumerate(self._discs):
             first = OF_TILE + d * OF_DISC
             picture = _over(picture, bits, texels, radius, numbers[:, first : first + OF_DISC])
@@ -155,7 +156,7 @@ def _look(plane: Plane) -> tuple[Any, ...]:
     discs = (
         (id(disc.texels.pairs), float(disc.texels.low), float(disc.texels.step), disc.radius) for disc in plane.discs
     )
-    return plane.shape, id(plane.tile), *discs
+    return plane.shape, id(plane.tile.samples), *discs
 
 
 def _bits(texels: Texels, device: torch.device) -> Tensor:
