@@ -14,6 +14,7 @@ import numpy as np
 
 from scenes.flat.painted_disk import PlacedDisc, Plane, Texels, Tile
 from scenes.flat.planes import MovingDisc, PlanarScene
+from scenes.keys import AT_REST
 from scenes.protocol import Gaze
 from spikecam_env.compiled import njit
 from spikecam_env.types import Floats, Pictures
@@ -80,10 +81,11 @@ class Disc:
         """[radians/frame]"""
         return 2 * np.pi * self.rpm / (60 * frame_rate_hz)
 
-    def at(self, frame: float, frame_rate_hz: float) -> MovingDisc:
-        """The disc at a frame."""
-        turn = self.turn(frame_rate_hz)
-        return MovingDisc(self.path.at(frame), self.path.velocity(frame), self.angle + turn * frame, turn, self.radius)
+    def at(self, frame: float, frame_rate_hz: float, gaze: Gaze = AT_REST) -> MovingDisc:
+        """The disc at a frame, as a camera sees it."""
+        turn, (x, y), (pan, tilt) = self.turn(frame_rate_hz), self.path.at(frame), gaze.at(frame)
+        velocity = self.path.velocity(frame)
+        return MovingDisc((x - pan, y - tilt), velocity, self.angle + turn * frame, turn, self.radius)
 
 
 @dataclass(frozen=True, eq=False)
@@ -97,9 +99,9 @@ class Discs(PlanarScene):
     discs: dict[str, Disc]
     """By name, from the back."""
 
-    def placed_discs(self, frame: float) -> dict[str, MovingDisc]:
+    def placed_discs(self, frame: float, gaze: Gaze) -> dict[str, MovingDisc]:
         """See `PlanarScene`."""
-        return {name: disc.at(frame, self.frame_rate_hz) for name, disc in self.discs.items()}
+        return {name: disc.at(frame, self.frame_rate_hz, gaze) for name, disc in self.discs.items()}
 
     def speed(self) -> float:
         """See `PlanarScene`."""

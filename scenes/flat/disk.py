@@ -117,11 +117,11 @@ class RotatingDisk(PlanarScene):
             f"centre={self.centre}, drift_px_s={self.drift_px_s}, angle={self.angle:g})"
         )
 
-    def placed_discs(self, frame: float) -> dict[str, MovingDisc]:
+    def placed_discs(self, frame: float, gaze: Gaze) -> dict[str, MovingDisc]:
         """See `PlanarScene`."""
         x, y = self.drift_px_s
         drift = (x / self.frame_rate_hz, y / self.frame_rate_hz)
-        return {"disk": MovingDisc(self.centre_at(frame), drift, self.angle_at(frame), self._turn, self.radius)}
+        return {"disk": MovingDisc(self.centre_at(frame, gaze), drift, self.angle_at(frame), self._turn, self.radius)}
 
     def speed(self) -> float:
         """See `PlanarScene`."""

@@ -53,7 +53,7 @@ class Texels:
 
 @dataclass(frozen=True, eq=False)
 class Tile:
-    """A background that repeats without end, as the processor reads it fastest: samples a pixel apart are neighbours."""
+    """A background that repeats without end, as the processor reads it fastest: samples a pixel apart adjoin."""
 
     samples: Pictures
     """(h, step, n) float32: sample (row, s) stands at [row, s % step, s // step], on and on over the period's end for
@@ -86,7 +86,7 @@ class Tile:
     @property
     def step(self) -> int:
         """Samples from pixel to pixel."""
-        return self.samples.shape[1]
+        return int(self.samples.shape[1])
 
     def in_order(self) -> Pictures:
         """(h, period), the samples as `of` takes them."""

@@ -22,12 +22,12 @@ from spikecam_env.types import Floats, Pictures
 
 
 class MovingDisc(NamedTuple):
-    """A disc at an instant, before a camera at rest."""
+    """A disc at an instant."""
 
     centre: tuple[float, float]
-    """(x, y) [pixels]."""
+    """(x, y) in the picture [pixels]."""
     velocity: tuple[float, float]
-    """(x, y) [pixels/frame]."""
+    """(x, y), before a camera at rest [pixels/frame]."""
     angle: float
     """[radians]."""
     turn: float
@@ -47,40 +47,47 @@ class PlanarScene:
         """Of the fastest point [pixels/frame], before a camera at rest."""
         raise NotImplementedError
 
-    def placed_discs(self, frame: float) -> dict[str, MovingDisc]:
-        """The discs at a frame by name, from the back."""
-        raise NotImplementedError
+    def placed_discs(self, frame: float, gaze: Gaze) -> dict[str, MovingDisc]:
+        """The discs at a frame by name, from the back; default: none."""
+        return {}
 
     def plane_at(self, frame: Floats, gaze: Gaze) -> Plane:
         """The plane at these frames (K,)."""
         raise NotImplementedError
 
+    def velocity(self, gaze: Gaze | None = None) -> tuple[float, float]:
+        """(x, y) of the tile in the picture [pixels/frame]; default: it rests in the scene."""
+        pan, tilt = (gaze or AT_REST).rate
+        return 0.0 - pan, 0.0 - tilt
+
+    def interval(self, gaze: Gaze | None = None) -> int:
+        """Frames from key to key; default: the fastest point moves at most `motion_per_key`, where it can."""
+        return interval_for(self.speed() + float(np.hypot(*(gaze or AT_REST).rate)), self.motion_per_key)
+
     def plane(self, start: int, stop: int, gaze: Gaze | None = None) -> Plane:
         """The plane at the keys that cover frames [start, stop]."""
-        interval = interval_for(self.speed() + (float(np.hypot(*gaze.rate)) if gaze else 0.0), self.motion_per_key)
-        return self.plane_at(key_frames(self.shape, start, stop, interval, gaze), gaze or AT_REST)
+        return self.plane_at(key_frames(self.shape, start, stop, self.interval(gaze), gaze), gaze or AT_REST)
 
     def truth(self, frame: float, gaze: Gaze | None = None) -> Truth:
         """Ground truth at a frame: object n is the n-th disc, poses[name] its (x, y, angle); see `protocol.Truth`."""
-        gaze = gaze or AT_REST
-        radiance = painted_planes([self.plane_at(np.array([frame], np.float64), gaze)])[0].radiance[0]
-        flow, owner = np.zeros((*self.shape, 2)), np.zeros(self.shape, np.int32)
+        camera = gaze or AT_REST
+        radiance = painted_planes([self.plane_at(np.array([frame], np.float64), camera)])[0].radiance[0]
+        flow, owner = np.empty((*self.shape, 2)), np.zeros(self.shape, np.int32)
+        flow[:] = self.velocity(gaze)
         poses: dict[str, tuple[float, ...]] = {}
-        pan, tilt = gaze.at(frame)
-        for number, (name, disc) in enumerate(self.placed_discs(frame).items(), 1):
-            x, y = disc.centre[0] - pan, disc.centre[1] - tilt
-            dx, dy = np.arange(self.shape[1]) - x, (np.arange(self.shape[0]) - y)[:, None]
+        for number, (name, disc) in enumerate(self.placed_discs(frame, camera).items(), 1):
+            dx, dy = np.arange(self.shape[1]) - disc.centre[0], (np.arange(self.shape[0]) - disc.centre[1])[:, None]
             inside = dx**2 + dy**2 <= disc.radius**2
-            flow[..., 0] = np.where(inside, disc.turn * dy + disc.velocity[0], flow[..., 0])
-            flow[..., 1] = np.where(inside, -disc.turn * dx + disc.velocity[1], flow[..., 1])
+            velocity = disc.turn * dy + disc.velocity[0], -disc.turn * dx + disc.velocity[1]
+            for axis in (0, 1):
+                flow[..., axis] = np.where(inside, velocity[axis] - camera.rate[axis], flow[..., axis])
             owner[inside] = number
-            poses[name] = (x, y, disc.angle % (2 * np.pi))
-        return Truth(radiance, (flow - gaze.rate).astype(np.float32), owner, None, poses | {"camera": gaze.at(frame)})
+            poses[name] = (*disc.centre, disc.angle % (2 * np.pi))
+        return Truth(radiance, flow.astype(np.float32), owner, None, poses | {"camera": camera.at(frame)})
 
     def places(self, frame: float, gaze: Gaze | None = None) -> dict[str, tuple[float, float]]:
         """Where the discs' middles are seen, see `scenes.protocol.Placed`."""
-        pan, tilt = (gaze or AT_REST).at(frame)
-        return {name: (d.centre[0] - pan, d.centre[1] - tilt) for name, d in self.placed_discs(frame).items()}
+        return {name: disc.centre for name, disc in self.placed_discs(frame, gaze or AT_REST).items()}
 
     def radiance(self, start: int, stop: int, gaze: Gaze | None = None, *, device: Any = None) -> Keyframes:
         """Keys that cover frames [start, stop]: (K,) float64 whole frames, (K, H, W) float32.

@@ -43,44 +43,12 @@ def planes_on(planes: Sequence[Plane], device: str | torch.device) -> list[Keyfr
     groups: dict[Any, list[int]] = {}
     for number, plane in enumerate(planes):
         groups.setdefault(_look(plane), []).append(number)
-    light: dict[int, Tensor] = {}
+    light: dict[int, Any] = {}
     for numbers in groups.values():
         alike = [planes[number] for number in numbers]
         pictures = PlanePainter(alike[0], checked).painted(alike)
         light |= zip(numbers, pictures.split([len(plane.frame) for plane in alike]), strict=True)
-    return [keys_of(plane.frame, light[number]) for number, plane in enumerate(planes)]
-
-
-def repeated_on(
-    array: NDArray[Any],
-    made: Callable[[NDArray[Any]], Pictures],
-    frame: Floats,
-    first: tuple[Floats, Floats],
-    shape: tuple[int, int],
-    step: int,
-    device: str | torch.device,
-) -> Keyframes:
-    """Keys of a repeated tile.
-
-    Args:
-        array: from which `made` makes the tile (h, w).
-        made: is called once for an array.
-        frame: (K,) of the keys.
-        first: x and y (K,) of the first pixel [samples].
-        shape: (rows, columns) of the picture.
-        step: samples from pixel to pixel.
-        device: on which it is painted.
-    """
-    tile = uploaded(array, checked_device(device, "leave device out"), made)
-    numbers = torch.from_numpy(tile_numbers(*first, tile.shape).astype(np.float32)).to(tile.device)
-    many = max(1, TOGETHER // (shape[0] * shape[1]))
-    return keys_of(frame, torch.cat([tile_on(tile, some, shape, step) for some in numbers.split(many)]))
-
-
-def keys_of(frame: Floats, radiance: Tensor) -> Keyframes:
-    """Keys at frames (K,) whose light (K, H, W) float32 lies on a device; known to be right."""
-    pictures: Any = radiance
-    return Keyframes.known(frame, pictures)
+    return [Keyframes.known(plane.frame, light[number]) for number, plane in enumerate(planes)]
 
 
 class PlanePainter:
@@ -103,7 +71,7 @@ class PlanePainter:
     def numbers(self, planes: Sequence[Plane]) -> Pictures:
         """(K, OF_TILE + OF_DISC for each disc) numbers of each key."""
         pan, tilt = (np.concatenate([getattr(plane, name) for plane in planes]) for name in ("pan", "tilt"))
-        of_keys = [tile_numbers(pan, tilt, self._tile.shape)]
+        of_keys = [_tile_numbers(pan, tilt, self._tile.shape)]
         for d, (_, texels, radius) in enumerate(self._discs):
             of_disc = ([getattr(plane.discs[d], name) for plane in planes] for name in ("x", "y", "angle"))
             x, y, angle = map(np.concatenate, of_disc)
@@ -112,21 +80,21 @@ class PlanePainter:
 
     def paint(self, numbers: Tensor, still: bool = False) -> Tensor:
         """(K, H, W) light, from `numbers` on the device; with `still` the tile lies in each key as in the first."""
-        picture = tile_on(self._tile, numbers[:1] if still else numbers, self._shape, self._step)
+        picture = _tile_on(self._tile, numbers[:1] if still else numbers, self._shape, self._step)
         for d, (bits, texels, radius) in enumerate(self._discs):
             first = OF_TILE + d * OF_DISC
             picture = _over(picture, bits, texels, radius, numbers[:, first : first + OF_DISC])
         return picture.expand(len(numbers), *self._shape)
 
 
-def tile_numbers(x: Floats, y: Floats, shape: Sequence[int]) -> Floats:
-    """(K, OF_TILE) of a tile of `shape`, seen from places x, y (K,) [texels]."""
+def _tile_numbers(x: Floats, y: Floats, shape: Sequence[int]) -> Floats:
+    """(K, OF_TILE) of a tile of `shape`, seen from places x, y (K,) [samples]."""
     left, top = np.floor(x), np.floor(y)
     return np.stack([left % shape[1], top % shape[0], x - left, y - top], axis=1)
 
 
-def tile_on(tile: Tensor, numbers: Tensor, shape: tuple[int, int], step: int = 1) -> Tensor:
-    """(K, H, W): a repeated tile, bilinear, from numbers (K, OF_TILE) or more, with `step` texels a pixel."""
+def _tile_on(tile: Tensor, numbers: Tensor, shape: tuple[int, int], step: int) -> Tensor:
+    """(K, H, W): a repeated tile, bilinear, from numbers (K, OF_TILE) or more, with `step` samples a pixel."""
     left, top, right_share, lower_share = (numbers[:, i, None, None] for i in range(OF_TILE))
     row = top.long() + step * torch.arange(shape[0], device=tile.device)[None, :, None]
     column = left.long() + step * torch.arange(shape[1], device=tile.device)[None, None, :]
