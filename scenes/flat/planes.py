@@ -7,12 +7,14 @@ of all keys of all scenes.  A picture does not depend on the others of the call.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from functools import partial
 from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
-from scenes.flat.painted_disk import PlacedDisc, Plane, paint_scenes, parts_of, places_of
+from scenes.flat.painted_disk import PlacedDisc, Plane, Texels, Tile, paint_scenes, parts_of, places_of
 from scenes.keys import AT_REST, interval_for, key_frames, threads_for
 from scenes.protocol import Gaze, Truth
 from spikecam_env.sensor import Keyframes
@@ -71,13 +73,17 @@ class PlanarScene:
     def truth(self, frame: float, gaze: Gaze | None = None) -> Truth:
         """Ground truth at a frame: object n is the n-th disc, poses[name] its (x, y, angle); see `protocol.Truth`."""
         camera = gaze or AT_REST
-        radiance = painted_planes([self.plane_at(np.array([frame], np.float64), camera)])[0].radiance[0]
+        plane, things = self.plane_at(np.array([frame], np.float64), camera), self.placed_discs(frame, camera)
+        radiance = painted_planes([plane])[0].radiance[0]
         flow, owner = np.empty((*self.shape, 2)), np.zeros(self.shape, np.int32)
         flow[:] = self.velocity(gaze)
         poses: dict[str, tuple[float, ...]] = {}
-        for number, (name, disc) in enumerate(self.placed_discs(frame, camera).items(), 1):
+        for number, name in enumerate(things, 1):
+            disc, placed = things[name], plane.discs[number - len(things) - 1]
             dx, dy = np.arange(self.shape[1]) - disc.centre[0], (np.arange(self.shape[0]) - disc.centre[1])[:, None]
-            inside = dx**2 + dy**2 <= disc.radius**2
+            inside = (
+                dx**2 + dy**2 <= disc.radius**2 if placed.mask is None else _mostly_covered(plane, placed, placed.mask)
+            )
             velocity = disc.turn * dy + disc.velocity[0], -disc.turn * dx + disc.velocity[1]
             for axis in (0, 1):
                 flow[..., axis] = np.where(inside, velocity[axis] - camera.rate[axis], flow[..., axis])
@@ -110,6 +116,13 @@ class PlanarScene:
         return planes_on(planes, device)[0]
 
 
+def _mostly_covered(plane: Plane, shape: PlacedDisc, mask: Texels) -> NDArray[np.bool_]:
+    """(H, W), whether a shape covers more than half of a pixel, at a plane's first key."""
+    alone = replace(plane, tile=Tile.dark(plane.shape), discs=[shape._replace(texels=mask)])
+    covered: NDArray[np.bool_] = painted_planes([alone])[0].radiance[0] > 0.5
+    return covered
+
+
 def painted_planes(planes: Sequence[Plane], threads: int | None = None) -> list[Keyframes]:
     """The light of each, painted on threads as `scenes.keys.threads_for` counts them."""
     light = [np.empty((len(plane.frame), *plane.shape), np.float32) for plane in planes]
@@ -130,9 +143,10 @@ def paint_planes(planes: Sequence[Plane], light: Sequence[Pictures], threads: in
         of_scene = done, done + len(plane.discs)
         scenes.append((*behind, *plane.shape, *into, *of_scene, parts))
         for disc in plane.discs:
-            texels = disc.texels
-            textures.append((address_of(texels.pairs), texels.side, rows))
-            numbers.append((disc.radius, float(texels.low), float(texels.step)))
+            texels, mask = disc.texels, disc.mask
+            covered, covers = (address_of(mask.pairs), float(mask.step)) if mask else (0, 0.0)
+            textures.append((address_of(texels.pairs), texels.side, texels.period, covered, rows))
+            numbers.append((disc.radius, float(texels.low), float(texels.step), covers))
             rows += len(pictures)
         keys, done = keys + len(pictures), of_scene[1]
         parts += parts_of(len(pictures), plane.shape[0])
@@ -142,8 +156,8 @@ def paint_planes(planes: Sequence[Plane], light: Sequence[Pictures], threads: in
         np.array(scenes, np.int64),
         np.concatenate([plane.pan for plane in planes]),
         np.concatenate([plane.tilt for plane in planes]),
-        np.array(textures, np.int64).reshape(-1, 3),
-        np.array(numbers, np.float64).reshape(-1, 3),
+        np.array(textures, np.int64).reshape(-1, 5),
+        np.array(numbers, np.float64).reshape(-1, 4),
         _places(discs),
     )
     together([partial(paint_scenes, *work)] * threads_for(keys, threads), shared=True)
@@ -153,7 +167,5 @@ def _places(discs: Sequence[PlacedDisc]) -> Floats:
     """Places of each at each of its keys, one disc after another, for `paint_scenes`."""
     if not discs:
         return np.empty((0, 6))
-    keys = [len(disc.x) for disc in discs]
     x, y, angle = (np.concatenate(parts) for parts in zip(*((d.x, d.y, d.angle) for d in discs), strict=True))
-    side = np.repeat([float(disc.texels.side) for disc in discs], keys)
-    return places_of(side, np.repeat([disc.radius for disc in discs], keys), x, y, angle)
+    return places_of(np.repeat([disc.grid for disc in discs], [len(disc.x) for disc in discs], axis=0), x, y, angle)
