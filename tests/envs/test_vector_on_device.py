@@ -79,7 +79,7 @@ def test_the_state_beside_the_picture_is_a_tensor_too() -> None:
 
 
 def test_scenes_in_space_are_painted_on_the_host() -> None:
-    options = {"obs": "spikes", "scene": "ball", "shape": (22, 26)}
+    options = {"obs": "spikes", "scene": "collage", "shape": (22, 26)}
     wanted = played(vector("spikecam_env/Scene-v0", None, 2, **options))
     found = played(vector("spikecam_env/Scene-v0", DEVICE, 2, **options))
     assert all(np.array_equal(a[0].cpu().numpy(), b[0]) for a, b in zip(found, wanted, strict=True))
