@@ -185,19 +185,21 @@ def _piece(texels: Texels, corner: Floats, size: int) -> Pictures:
 
 
 def _mask(kind: str, half_width: float, half_height: float, blades: int) -> Pictures:
-    """Coverage of a shape in its sprite, from the signed distance to its edge [pixels]."""
+    """Coverage of a shape in its sprite."""
     reach = float(np.hypot(half_width, half_height)) if kind == "rectangle" else max(half_width, half_height)
     size = 2 * int(np.ceil(reach + 2))
     y, x = np.indices((size, size)) - (size - 1) / 2
-    radius = np.hypot(x, y)
-    if kind == "ellipse":
-        inside = (1 - np.hypot(x / half_width, y / half_height)) * min(half_width, half_height)
-    elif kind == "rectangle":
-        inside = np.minimum(half_width - abs(x), half_height - abs(y))
-    else:
-        edge = np.sin(blades * np.arctan2(y, x)) * radius / blades
-        inside = np.minimum(edge, reach - radius)
+    inside = depths(np, x, y, half_width, half_height, blades)[SHAPES.index(kind)]
     return np.asarray(np.clip(inside + 0.5, 0, 1).astype(np.float32))
+
+
+def depths(of: Any, x: Any, y: Any, half_width: Any, half_height: Any, blades: Any) -> tuple[Any, Any, Any]:
+    """Depth inside an ellipse, a rectangle and a fan (SHAPES) at (x, y) from the middle [pixels]; `of`: numpy or torch."""
+    radius = of.hypot(x, y)
+    ellipse = (1 - of.hypot(x / half_width, y / half_height)) * of.minimum(half_width, half_height)
+    rectangle = of.minimum(half_width - abs(x), half_height - abs(y))
+    blade = of.sin(blades * of.arctan2(y, x)) * radius / blades
+    return ellipse, rectangle, of.minimum(blade, of.maximum(half_width, half_height) - radius)
 
 
 def _key_every(fastest: float) -> int:
