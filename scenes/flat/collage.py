@@ -194,7 +194,7 @@ def _mask(kind: str, half_width: float, half_height: float, blades: int) -> Pict
 
 
 def depths(of: Any, x: Any, y: Any, half_width: Any, half_height: Any, blades: Any) -> tuple[Any, Any, Any]:
-    """Depth inside an ellipse, a rectangle and a fan (SHAPES) at (x, y) from the middle [pixels]; `of`: numpy or torch."""
+    """Depth inside an ellipse, a rectangle and a fan (SHAPES) at (x, y) from the middle [pixels]; of: numpy or torch."""
     radius = of.hypot(x, y)
     ellipse = (1 - of.hypot(x / half_width, y / half_height)) * of.minimum(half_width, half_height)
     rectangle = of.minimum(half_width - abs(x), half_height - abs(y))
