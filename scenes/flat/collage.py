@@ -20,6 +20,7 @@ from scenes.keys import AT_REST, LONGEST_INTERVAL
 from scenes.protocol import FRAME_RATES_HZ, MOST_LIGHT, MOST_PLACE, Gaze, Truth
 from scenes.textures import random_texture
 from spikecam_env.checked import checked_number, checked_shape
+from spikecam_env.errors import InputError
 from spikecam_env.types import Floats, Pictures
 
 SHAPES = ("ellipse", "rectangle", "fan")
@@ -66,6 +67,9 @@ class Collage(PlanarScene):
         self.light = checked_number(light, "light", 0.0, MOST_LIGHT, above=True)
         checked_number(speed, "speed", 0.0, MOST_PLACE)
         checked_number(contrast, "contrast", 1.0)
+        for texture in () if textures is None else textures:
+            if texture.ndim != 2 or texture.shape[0] != texture.shape[1]:
+                raise InputError(f"textures has one of shape {texture.shape}; they must be square")
         rng = np.random.default_rng(seed)
         count = int(rng.integers(3, 7)) if layers is None else layers
         drawn = [_draw_layer(rng, self, speed, contrast, kinds, textures, i == 0) for i in range(count + 1)]
@@ -194,7 +198,7 @@ def _mask(kind: str, half_width: float, half_height: float, blades: int) -> Pict
 
 
 def depths(of: Any, x: Any, y: Any, half_width: Any, half_height: Any, blades: Any) -> tuple[Any, Any, Any]:
-    """Depth inside an ellipse, a rectangle and a fan (SHAPES) at (x, y) from the middle [pixels]; of: numpy or torch."""
+    """Depth in an ellipse, a rectangle and a fan (SHAPES) at (x, y) from the middle [pixels]; of: numpy or torch."""
     radius = of.hypot(x, y)
     ellipse = (1 - of.hypot(x / half_width, y / half_height)) * of.minimum(half_width, half_height)
     rectangle = of.minimum(half_width - abs(x), half_height - abs(y))

@@ -322,12 +322,9 @@ def _paint_disc(
     """
     use_widest_vectors()
     pairs, side, period, mask = texture[0], np.int32(texture[1]), np.float32(texture[2]), texture[3]
-    radius, (low, step, mask_step) = (
-        numbers[0],
-        (np.float32(numbers[1]), np.float32(numbers[2]), np.float32(numbers[3])),
-    )
+    low, step, mask_step = np.float32(numbers[1]), np.float32(numbers[2]), np.float32(numbers[3])
     x, y, u0, v0, cosine, sine = place
-    reach, solid = np.float32(radius + 0.5), np.float32(max(radius - 0.5, 0.0))
+    reach, solid = np.float32(numbers[0] + 0.5), np.float32(max(numbers[0] - 0.5, 0.0))
     du, dv, turns = np.float32(cosine), np.float32(sine), np.float32(1 / max(texture[2], 1))
     rows, columns = picture.shape
     index, texels = np.empty(columns, np.uint32), np.empty(columns, np.uint64)

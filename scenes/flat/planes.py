@@ -24,7 +24,7 @@ from spikecam_env.types import Floats, Pictures
 
 
 class MovingDisc(NamedTuple):
-    """A disc at an instant."""
+    """A disc or shape at an instant."""
 
     centre: tuple[float, float]
     """(x, y) in the picture [pixels]."""
@@ -39,7 +39,7 @@ class MovingDisc(NamedTuple):
 
 
 class PlanarScene:
-    """Base of scenes whose light is a `Plane`: a tile, and discs that turn and move before it."""
+    """Base of scenes whose light is a `Plane`: a tile, and discs or shapes that turn and move before it."""
 
     shape: tuple[int, int]
     motion_per_key: float = 0.6
@@ -50,7 +50,7 @@ class PlanarScene:
         raise NotImplementedError
 
     def placed_discs(self, frame: float, gaze: Gaze) -> dict[str, MovingDisc]:
-        """The discs at a frame by name, from the back; default: none."""
+        """The things before the background at a frame by name, from the back; default: none."""
         return {}
 
     def plane_at(self, frame: Floats, gaze: Gaze) -> Plane:
@@ -77,18 +77,15 @@ class PlanarScene:
         radiance = painted_planes([plane])[0].radiance[0]
         flow, owner = np.empty((*self.shape, 2)), np.zeros(self.shape, np.int32)
         flow[:] = self.velocity(gaze)
-        poses: dict[str, tuple[float, ...]] = {}
-        for number, name in enumerate(things, 1):
-            disc, placed = things[name], plane.discs[number - len(things) - 1]
-            dx, dy = np.arange(self.shape[1]) - disc.centre[0], (np.arange(self.shape[0]) - disc.centre[1])[:, None]
-            inside = (
-                dx**2 + dy**2 <= disc.radius**2 if placed.mask is None else _mostly_covered(plane, placed, placed.mask)
-            )
-            velocity = disc.turn * dy + disc.velocity[0], -disc.turn * dx + disc.velocity[1]
+        laid = plane.discs[len(plane.discs) - len(things) :]
+        for number, (thing, disc) in enumerate(zip(things.values(), laid, strict=True), 1):
+            dx, dy = np.arange(self.shape[1]) - thing.centre[0], (np.arange(self.shape[0]) - thing.centre[1])[:, None]
+            inside = _covered(plane, disc, disc.mask) if disc.mask else dx**2 + dy**2 <= disc.radius**2
+            velocity = thing.turn * dy + thing.velocity[0], -thing.turn * dx + thing.velocity[1]
             for axis in (0, 1):
                 flow[..., axis] = np.where(inside, velocity[axis] - camera.rate[axis], flow[..., axis])
             owner[inside] = number
-            poses[name] = (*disc.centre, disc.angle % (2 * np.pi))
+        poses = {name: (*thing.centre, thing.angle % (2 * np.pi)) for name, thing in things.items()}
         return Truth(radiance, flow.astype(np.float32), owner, None, poses | {"camera": camera.at(frame)})
 
     def places(self, frame: float, gaze: Gaze | None = None) -> dict[str, tuple[float, float]]:
@@ -116,7 +113,7 @@ class PlanarScene:
         return planes_on(planes, device)[0]
 
 
-def _mostly_covered(plane: Plane, shape: PlacedDisc, mask: Texels) -> NDArray[np.bool_]:
+def _covered(plane: Plane, shape: PlacedDisc, mask: Texels) -> NDArray[np.bool_]:
     """(H, W), whether a shape covers more than half of a pixel, at a plane's first key."""
     alone = replace(plane, tile=Tile.dark(plane.shape), discs=[shape._replace(texels=mask)])
     covered: NDArray[np.bool_] = painted_planes([alone])[0].radiance[0] > 0.5

@@ -119,7 +119,7 @@ def test_gaze_motion_is_in_the_flow():
     assert np.allclose(difference, (-1.0, 0.5), atol=1e-5)
 
 
-@pytest.mark.parametrize("bad", [{"speed": -1.0}, {"light": 0.0}, {"contrast": 0.5}])
+@pytest.mark.parametrize("bad", [{"speed": -1.0}, {"light": 0.0}, {"contrast": 0.5}, {"textures": [np.eye(4, 5)]}])
 def test_bad_options_are_named(bad):
     with pytest.raises(InputError, match=next(iter(bad))):
         Collage(SHAPE, 0, **bad)
