@@ -127,9 +127,7 @@ class _Layer:
 
     def at(self, frame: float, gaze: Gaze, shape: tuple[int, int]) -> MovingDisc:
         """The layer at a frame."""
-        return MovingDisc(
-            self._middle(frame, gaze, shape), self.velocity, -self._turned(frame), -self.spin, self.radius
-        )
+        return MovingDisc(self._middle(frame, gaze, shape), self.velocity, -self._turned(frame), -self.spin)
 
     def _turned(self, frame: Any) -> Any:
         """Angle at a frame, or at each of several, clockwise in the picture [radians]."""

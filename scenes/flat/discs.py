@@ -14,7 +14,6 @@ import numpy as np
 
 from scenes.flat.painted_disk import PlacedDisc, Plane, Texels, Tile
 from scenes.flat.planes import MovingDisc, PlanarScene
-from scenes.keys import AT_REST
 from scenes.protocol import Gaze
 from spikecam_env.compiled import njit
 from spikecam_env.types import Floats, Pictures
@@ -81,11 +80,10 @@ class Disc:
         """[radians/frame]"""
         return 2 * np.pi * self.rpm / (60 * frame_rate_hz)
 
-    def at(self, frame: float, frame_rate_hz: float, gaze: Gaze = AT_REST) -> MovingDisc:
+    def at(self, frame: float, frame_rate_hz: float, gaze: Gaze) -> MovingDisc:
         """The disc at a frame, as a camera sees it."""
         turn, (x, y), (pan, tilt) = self.turn(frame_rate_hz), self.path.at(frame), gaze.at(frame)
-        velocity = self.path.velocity(frame)
-        return MovingDisc((x - pan, y - tilt), velocity, self.angle + turn * frame, turn, self.radius)
+        return MovingDisc((x - pan, y - tilt), self.path.velocity(frame), self.angle + turn * frame, turn)
 
 
 @dataclass(frozen=True, eq=False)

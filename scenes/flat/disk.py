@@ -121,7 +121,7 @@ class RotatingDisk(PlanarScene):
         """See `PlanarScene`."""
         x, y = self.drift_px_s
         drift = (x / self.frame_rate_hz, y / self.frame_rate_hz)
-        return {"disk": MovingDisc(self.centre_at(frame, gaze), drift, self.angle_at(frame), self._turn, self.radius)}
+        return {"disk": MovingDisc(self.centre_at(frame, gaze), drift, self.angle_at(frame), self._turn)}
 
     def speed(self) -> float:
         """See `PlanarScene`."""

@@ -34,8 +34,6 @@ class MovingDisc(NamedTuple):
     """[radians]."""
     turn: float
     """[radians/frame]; positive is counter-clockwise."""
-    radius: float
-    """[pixels]."""
 
 
 class PlanarScene:
