@@ -2,8 +2,8 @@
 
     textures, units (drawn once, on the processor) -> light (collage) -> noisy and clean spikes (`kernels.cuda`)
 
-A stream is a collage of textured shapes in rigid motion (the world of `collage.py`, here without sprites: coverage
-is computed from the signed distance to a shape's edge) before one sensor unit.  It begins anew, as another scene before
+A stream is a collage of textured shapes in rigid motion (the shapes of `scenes.flat.collage`, whose coverage is here
+computed for every pixel of every frame) before one sensor unit.  It begins anew, as another scene before
 another unit, when it has reached its age.  The sensor's law and draws are those of the fast engine; units are patches
 of larger units that the sensor's own code drew.  Everything follows from the seed; on a GPU nothing comes from the
 host after the start.
@@ -22,6 +22,7 @@ from torch import Tensor
 from tqdm import tqdm
 
 from denoiser.training.pairs import TRAINING_KINDS, draw_model
+from scenes.flat.collage import depths
 from scenes.textures import random_texture
 from spikecam_env.errors import InputError
 from spikecam_env.sensor.kernels import cuda, fast
@@ -424,13 +425,9 @@ def _texture(textures: Tensor, chosen: Tensor, x: Tensor, y: Tensor) -> Tensor:
 
 
 def _coverage(u: Tensor, v: Tensor, layer: dict[str, Tensor]) -> Tensor:
-    """Share of each pixel that a shape covers, from the distance to its edge [pixels] (`scenes.flat.collage`)."""
-    a, b = (layer["extent"][:, i, None, None, None] for i in (0, 1))
-    radius = torch.hypot(u, v)
-    ellipse = (1 - torch.hypot(u / a, v / b)) * torch.minimum(a, b)
-    rectangle = torch.minimum(a - u.abs(), b - v.abs())
-    blades = layer["blades"][:, None, None, None]
-    fan = torch.minimum(torch.sin(blades * torch.atan2(v, u)) * radius / blades, torch.maximum(a, b) - radius)
-    shape = layer["shape"][:, None, None, None]
+    """Share of each pixel that a shape covers."""
+    width, height = (layer["extent"][:, i, None, None, None] for i in (0, 1))
+    shape, blades = (layer[name][:, None, None, None] for name in ("shape", "blades"))
+    ellipse, rectangle, fan = depths(torch, u, v, width, height, blades)
     inside = torch.where(shape == 0, ellipse, torch.where(shape == 1, rectangle, fan))
     return (inside + 0.5).clamp(0.0, 1.0) * layer["shown"][:, None, None, None]

@@ -12,7 +12,7 @@ from functools import cached_property
 
 import numpy as np
 
-from scenes.flat.painted_disk import PlacedDisc, Plane, Texels
+from scenes.flat.painted_disk import PlacedDisc, Plane, Texels, Tile
 from scenes.flat.planes import MovingDisc, PlanarScene
 from scenes.protocol import Gaze
 from spikecam_env.compiled import njit
@@ -80,10 +80,10 @@ class Disc:
         """[radians/frame]"""
         return 2 * np.pi * self.rpm / (60 * frame_rate_hz)
 
-    def at(self, frame: float, frame_rate_hz: float) -> MovingDisc:
-        """The disc at a frame."""
-        turn = self.turn(frame_rate_hz)
-        return MovingDisc(self.path.at(frame), self.path.velocity(frame), self.angle + turn * frame, turn, self.radius)
+    def at(self, frame: float, frame_rate_hz: float, gaze: Gaze) -> MovingDisc:
+        """The disc at a frame, as a camera sees it."""
+        turn, (x, y), (pan, tilt) = self.turn(frame_rate_hz), self.path.at(frame), gaze.at(frame)
+        return MovingDisc((x - pan, y - tilt), self.path.velocity(frame), self.angle + turn * frame, turn)
 
 
 @dataclass(frozen=True, eq=False)
@@ -97,9 +97,9 @@ class Discs(PlanarScene):
     discs: dict[str, Disc]
     """By name, from the back."""
 
-    def placed_discs(self, frame: float) -> dict[str, MovingDisc]:
+    def placed_discs(self, frame: float, gaze: Gaze) -> dict[str, MovingDisc]:
         """See `PlanarScene`."""
-        return {name: disc.at(frame, self.frame_rate_hz) for name, disc in self.discs.items()}
+        return {name: disc.at(frame, self.frame_rate_hz, gaze) for name, disc in self.discs.items()}
 
     def speed(self) -> float:
         """See `PlanarScene`."""
@@ -118,7 +118,11 @@ class Discs(PlanarScene):
             x, y = disc.path.along(frame)
             angle = disc.angle + disc.turn(self.frame_rate_hz) * frame
             laid.append(PlacedDisc(disc.texels, disc.radius, x - pan, y - tilt, angle))
-        return Plane(self.shape, frame, self.tile, pan, tilt, laid)
+        return Plane(self.shape, frame, self._tile, pan, tilt, laid)
+
+    @cached_property
+    def _tile(self) -> Tile:
+        return Tile.of(self.tile, self.shape)
 
     @cached_property
     def _speed(self) -> float:

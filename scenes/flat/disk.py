@@ -22,7 +22,7 @@ import numpy as np
 import scipy
 from numpy.typing import ArrayLike
 
-from scenes.flat.painted_disk import PlacedDisc, Plane, Texels, paint_tile, prefiltered
+from scenes.flat.painted_disk import PlacedDisc, Plane, Texels, Tile, prefiltered
 from scenes.flat.planes import MovingDisc, PlanarScene
 from scenes.keys import AT_REST
 from scenes.protocol import FRAME_RATES_HZ, MOST_LIGHT, MOST_PLACE, Gaze
@@ -109,9 +109,7 @@ class RotatingDisk(PlanarScene):
         size = int(np.clip(10 * self.radius, 128, 1024))
         values = disk_texture(textures, size) if texture is None else _checked_texture(texture)
         self._disk = Texels.of(prefiltered(light[0] + (light[1] - light[0]) * values, self.radius))
-        self._tile = _background_tile(background, backgrounds, self.shape, light)
-        self._background = np.empty(self.shape, np.float32)
-        paint_tile(self._tile, 0.0, 0.0, 0, self._background)
+        self._tile = Tile.of(_background(background, backgrounds, self.shape, light), self.shape)
 
     def __repr__(self) -> str:
         return (
@@ -119,11 +117,11 @@ class RotatingDisk(PlanarScene):
             f"centre={self.centre}, drift_px_s={self.drift_px_s}, angle={self.angle:g})"
         )
 
-    def placed_discs(self, frame: float) -> dict[str, MovingDisc]:
+    def placed_discs(self, frame: float, gaze: Gaze) -> dict[str, MovingDisc]:
         """See `PlanarScene`."""
         x, y = self.drift_px_s
         drift = (x / self.frame_rate_hz, y / self.frame_rate_hz)
-        return {"disk": MovingDisc(self.centre_at(frame), drift, self.angle_at(frame), self._turn, self.radius)}
+        return {"disk": MovingDisc(self.centre_at(frame, gaze), drift, self.angle_at(frame), self._turn)}
 
     def speed(self) -> float:
         """See `PlanarScene`."""
@@ -133,7 +131,7 @@ class RotatingDisk(PlanarScene):
         """See `PlanarScene`."""
         x, y = np.clip(self.centre_at(frame, gaze), -MOST_PLACE, MOST_PLACE)
         disk = PlacedDisc(self._disk, self.radius, x, y, self.angle_at(frame))
-        return Plane(self.shape, frame, self._tile, *gaze.at(frame), [disk], self._background)
+        return Plane(self.shape, frame, self._tile, *gaze.at(frame), [disk])
 
     def placed(
         self, centre: tuple[float, float], drift_px_s: tuple[float, float] = (0.0, 0.0), angle: float = 0.0
@@ -146,10 +144,9 @@ class RotatingDisk(PlanarScene):
 
     def lit(self, gain: float) -> RotatingDisk:
         """The same disk and background with `gain` times their light; shares the textures."""
-        other, by = copy.copy(self), np.float32(gain)
+        other = copy.copy(self)
         other.light = (self.light[0] * gain, self.light[1] * gain)
-        other._disk = self._disk.lit(gain)
-        other._tile, other._background = self._tile * by, self._background * by
+        other._disk, other._tile = self._disk.lit(gain), self._tile.lit(gain)
         return other
 
     def angle_at(self, frame: Any) -> Any:
@@ -232,7 +229,7 @@ def _round_text(text: str, turn: Pictures, radius: Pictures, inner: float, outer
     return white
 
 
-def _background_tile(
+def _background(
     background: float | ArrayLike | None, rng: np.random.Generator, shape: tuple[int, int], light: tuple[float, float]
 ) -> Pictures:
     """(h, w) float32 radiance, to be repeated."""

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from torch import Tensor
 from torch.nn.functional import grid_sample
 
-from scenes.flat.painted_disk import Plane, Texels, places_of
+from scenes.flat.painted_disk import PlacedDisc, Plane, Texels, places_of
 from spikecam_env.sensor import Keyframes
 from spikecam_env.sensor.kernels.cuda import checked_device
 from spikecam_env.types import Floats, Pictures
@@ -43,44 +43,12 @@ def planes_on(planes: Sequence[Plane], device: str | torch.device) -> list[Keyfr
     groups: dict[Any, list[int]] = {}
     for number, plane in enumerate(planes):
         groups.setdefault(_look(plane), []).append(number)
-    light: dict[int, Tensor] = {}
+    light: dict[int, Any] = {}
     for numbers in groups.values():
         alike = [planes[number] for number in numbers]
         pictures = PlanePainter(alike[0], checked).painted(alike)
         light |= zip(numbers, pictures.split([len(plane.frame) for plane in alike]), strict=True)
-    return [keys_of(plane.frame, light[number]) for number, plane in enumerate(planes)]
-
-
-def repeated_on(
-    array: NDArray[Any],
-    made: Callable[[NDArray[Any]], Pictures],
-    frame: Floats,
-    first: tuple[Floats, Floats],
-    shape: tuple[int, int],
-    step: int,
-    device: str | torch.device,
-) -> Keyframes:
-    """Keys of a repeated tile.
-
-    Args:
-        array: from which `made` makes the tile (h, w).
-        made: is called once for an array.
-        frame: (K,) of the keys.
-        first: x and y (K,) of the first pixel [samples].
-        shape: (rows, columns) of the picture.
-        step: samples from pixel to pixel.
-        device: on which it is painted.
-    """
-    tile = uploaded(array, checked_device(device, "leave device out"), made)
-    numbers = torch.from_numpy(tile_numbers(*first, tile.shape).astype(np.float32)).to(tile.device)
-    many = max(1, TOGETHER // (shape[0] * shape[1]))
-    return keys_of(frame, torch.cat([tile_on(tile, some, shape, step) for some in numbers.split(many)]))
-
-
-def keys_of(frame: Floats, radiance: Tensor) -> Keyframes:
-    """Keys at frames (K,) whose light (K, H, W) float32 lies on a device; known to be right."""
-    pictures: Any = radiance
-    return Keyframes.known(frame, pictures)
+    return [Keyframes.known(plane.frame, light[number]) for number, plane in enumerate(planes)]
 
 
 class PlanePainter:
@@ -88,8 +56,9 @@ class PlanePainter:
 
     def __init__(self, plane: Plane, device: torch.device) -> None:
         self._shape, self._device = plane.shape, device
-        self._tile = uploaded(plane.tile, device)
-        self._discs = [(_bits(disc.texels, device), disc.texels, disc.radius) for disc in plane.discs]
+        self._tile = uploaded(plane.tile.samples, device, lambda _: plane.tile.in_order())
+        self._step = plane.tile.step
+        self._discs = [(disc, *(_bits(texels, device) for texels in (disc.texels, disc.mask))) for disc in plane.discs]
 
     def painted(self, planes: Sequence[Plane]) -> Tensor:
         """(K, H, W) float32, the keys of one plane after those of another."""
@@ -102,30 +71,30 @@ class PlanePainter:
     def numbers(self, planes: Sequence[Plane]) -> Pictures:
         """(K, OF_TILE + OF_DISC for each disc) numbers of each key."""
         pan, tilt = (np.concatenate([getattr(plane, name) for plane in planes]) for name in ("pan", "tilt"))
-        of_keys = [tile_numbers(pan, tilt, self._tile.shape)]
-        for d, (_, texels, radius) in enumerate(self._discs):
+        of_keys = [_tile_numbers(pan, tilt, self._tile.shape)]
+        for d, (disc, *_) in enumerate(self._discs):
             of_disc = ([getattr(plane.discs[d], name) for plane in planes] for name in ("x", "y", "angle"))
             x, y, angle = map(np.concatenate, of_disc)
-            of_keys.append(places_of(np.full(len(x), float(texels.side)), np.full(len(x), radius), x, y, angle))
+            of_keys.append(places_of(np.tile(disc.grid, (len(x), 1)), x, y, angle))
         return np.concatenate(of_keys, axis=1).astype(np.float32)
 
     def paint(self, numbers: Tensor, still: bool = False) -> Tensor:
         """(K, H, W) light, from `numbers` on the device; with `still` the tile lies in each key as in the first."""
-        picture = tile_on(self._tile, numbers[:1] if still else numbers, self._shape)
-        for d, (bits, texels, radius) in enumerate(self._discs):
+        picture = _tile_on(self._tile, numbers[:1] if still else numbers, self._shape, self._step)
+        for d, (disc, bits, mask) in enumerate(self._discs):
             first = OF_TILE + d * OF_DISC
-            picture = _over(picture, bits, texels, radius, numbers[:, first : first + OF_DISC])
+            picture = _over(picture, disc, bits, mask, numbers[:, first : first + OF_DISC])
         return picture.expand(len(numbers), *self._shape)
 
 
-def tile_numbers(x: Floats, y: Floats, shape: Sequence[int]) -> Floats:
-    """(K, OF_TILE) of a tile of `shape`, seen from places x, y (K,) [texels]."""
+def _tile_numbers(x: Floats, y: Floats, shape: Sequence[int]) -> Floats:
+    """(K, OF_TILE) of a tile of `shape`, seen from places x, y (K,) [samples]."""
     left, top = np.floor(x), np.floor(y)
     return np.stack([left % shape[1], top % shape[0], x - left, y - top], axis=1)
 
 
-def tile_on(tile: Tensor, numbers: Tensor, shape: tuple[int, int], step: int = 1) -> Tensor:
-    """(K, H, W): a repeated tile, bilinear, from numbers (K, OF_TILE) or more, with `step` texels a pixel."""
+def _tile_on(tile: Tensor, numbers: Tensor, shape: tuple[int, int], step: int) -> Tensor:
+    """(K, H, W): a repeated tile, bilinear, from numbers (K, OF_TILE) or more, with `step` samples a pixel."""
     left, top, right_share, lower_share = (numbers[:, i, None, None] for i in range(OF_TILE))
     row = top.long() + step * torch.arange(shape[0], device=tile.device)[None, :, None]
     column = left.long() + step * torch.arange(shape[1], device=tile.device)[None, None, :]
@@ -136,30 +105,42 @@ def tile_on(tile: Tensor, numbers: Tensor, shape: tuple[int, int], step: int = 1
     return torch.lerp(to_left, to_right, right_share)
 
 
-def _over(behind: Tensor, bits: Tensor, texels: Texels, radius: float, places: Tensor) -> Tensor:
-    """A disc over the picture behind it (K or 1, H, W), at places (K, OF_DISC)."""
+def _over(behind: Tensor, disc: PlacedDisc, bits: Tensor, mask: Tensor | None, places: Tensor) -> Tensor:
+    """A disc or shape over the picture behind it (K or 1, H, W), at places (K, OF_DISC)."""
     x, y, u0, v0, cosine, sine = (places[:, i, None, None] for i in range(OF_DISC))
     row = torch.arange(behind.shape[1], device=bits.device, dtype=torch.float32)[None, :, None]
     column = torch.arange(behind.shape[2], device=bits.device, dtype=torch.float32)[None, None, :]
-    to_grid = 2.0 / (texels.side - 1)  # places of texels as -1 .. 1
     where = torch.stack([u0 + cosine * column - sine * row, v0 + sine * column + cosine * row], dim=-1)
-    seen = grid_sample(
-        bits.expand(len(places), 1, -1, -1), where * to_grid - 1.0, padding_mode="border", align_corners=True
-    )[:, 0]
-    cover = (radius + 0.5 - torch.hypot(column - x, row - y)).clamp(0.0, 1.0)
-    return torch.lerp(behind, float(texels.low) + float(texels.step) * seen, cover)
+    if disc.texels.period:
+        where = where.remainder(disc.texels.period)
+    light = _seen(disc.texels, bits, where)
+    if disc.mask is not None and mask is not None:
+        return light + (1.0 - _seen(disc.mask, mask, where)) * behind
+    cover = (disc.radius + 0.5 - torch.hypot(column - x, row - y)).clamp(0.0, 1.0)
+    return torch.lerp(behind, light, cover)
+
+
+def _seen(texels: Texels, bits: Tensor, where: Tensor) -> Tensor:
+    """(K, H, W): a square picture, bilinear, at places (K, H, W, 2) [texels]."""
+    to_grid = 2.0 / (texels.side - 1)  # places of texels as -1 .. 1
+    every = bits.expand(len(where), 1, -1, -1)
+    steps = grid_sample(every, where * to_grid - 1.0, padding_mode="border", align_corners=True)[:, 0]
+    return float(texels.low) + float(texels.step) * steps
 
 
 def _look(plane: Plane) -> tuple[Any, ...]:
     """Features common to planes that are painted in one go."""
     discs = (
-        (id(disc.texels.pairs), float(disc.texels.low), float(disc.texels.step), disc.radius) for disc in plane.discs
+        (id(disc.texels.pairs), float(disc.texels.low), float(disc.texels.step), disc.radius, id(disc.mask))
+        for disc in plane.discs
     )
-    return plane.shape, id(plane.tile), *discs
+    return plane.shape, id(plane.tile.samples), *discs
 
 
-def _bits(texels: Texels, device: torch.device) -> Tensor:
-    """(side, side) float32, in steps of the texels."""
+def _bits(texels: Texels | None, device: torch.device) -> Any:
+    """(side, side) float32, in steps of the texels; None of none."""
+    if texels is None:
+        return None
     side = texels.side
     return uploaded(texels.pairs, device, lambda pairs: (pairs & 0xFFFF).astype(np.float32).reshape(side, side))
 

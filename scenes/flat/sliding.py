@@ -9,24 +9,25 @@ either side of a pixel, and read between them.
 from __future__ import annotations
 
 import copy
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from scenes.keys import AT_REST, interval_for, key_frames, paint_keys
+from scenes.flat.painted_disk import Plane, Tile
+from scenes.flat.planes import PlanarScene
+from scenes.keys import AT_REST, interval_for
 from scenes.protocol import FRAME_RATES_HZ, MOST_LIGHT, MOST_PLACE, Gaze, Truth
 from scenes.textures import dead_leaves
 from spikecam_env.checked import checked_memory, checked_number, checked_shape
-from spikecam_env.compiled import njit
 from spikecam_env.errors import InputError
-from spikecam_env.sensor import Keyframes
 from spikecam_env.types import Floats, Pictures
 
 SAMPLES_PER_PIXEL = 4
 
 
-class SlidingTexture:
+class SlidingTexture(PlanarScene):
     """Scene: one texture over the whole picture at constant velocity.
 
     Truth: all is object 0; poses["texture"] is where its upper left corner has gone, (x, y) [pixels].
@@ -67,37 +68,30 @@ class SlidingTexture:
         self.velocity_px_s, self.frame_rate_hz = velocity_px_s, float(frame_rate_hz)
         self.motion_per_key = float(motion_per_key)
         samples = _area_average(_area_average(values.T, texel_px).T, texel_px)
-        self._period = samples.shape[1]
-        self._samples = _by_phase((light[0] + (light[1] - light[0]) * samples).astype(np.float32), self.shape[1])
+        radiance = (light[0] + (light[1] - light[0]) * samples).astype(np.float32)
+        self._tile = Tile.of(radiance, self.shape, SAMPLES_PER_PIXEL)
 
     def __repr__(self) -> str:
         return f"SlidingTexture(shape={self.shape}, velocity_px_s={self.velocity_px_s})"
 
-    def radiance(self, start: int, stop: int, gaze: Gaze | None = None, *, device: Any = None) -> Keyframes:
-        """Keys that cover frames [start, stop]; arguments are those of `scenes.flat.planes.PlanarScene.radiance`."""
-        speed = float(np.hypot(*self.velocity(gaze)))
-        frame = key_frames(self.shape, start, stop, interval_for(speed, self.motion_per_key), gaze)
-        if device is not None:
-            return self._on(device, frame, gaze)
-        return paint_keys(self.shape, frame, lambda t, picture: self._paint(t, gaze, picture))
+    def interval(self, gaze: Gaze | None = None) -> int:
+        """See `PlanarScene`."""
+        return interval_for(float(np.hypot(*self.velocity(gaze))), self.motion_per_key)
+
+    def plane_at(self, frame: Floats, gaze: Gaze) -> Plane:
+        """See `PlanarScene`."""
+        x, y = (-SAMPLES_PER_PIXEL * (corner + 0.5) for corner in self.corner_at(frame, gaze))
+        return Plane(self.shape, frame, self._tile, x % self._tile.period, y % len(self._tile.samples), [])
 
     def truth(self, frame: float, gaze: Gaze | None = None) -> Truth:
         """Ground truth at a frame; see `scenes.protocol.Truth`."""
-        radiance = np.empty(self.shape, np.float32)
-        self._paint(frame, gaze, radiance)
-        flow = np.broadcast_to(np.asarray(self.velocity(gaze), np.float32), (*self.shape, 2)).copy()
-        camera = (gaze or AT_REST).at(frame)
-        return Truth(
-            radiance,
-            flow,
-            np.zeros(self.shape, np.int32),
-            poses={"texture": self.corner_at(frame, gaze), "camera": camera},
-        )
+        truth = super().truth(frame, gaze)
+        return replace(truth, poses={"texture": self.corner_at(frame, gaze)} | truth.poses)
 
     def lit(self, gain: float) -> SlidingTexture:
         """The same texture with `gain` times its light."""
         other = copy.copy(self)
-        other._samples = self._samples * np.float32(gain)
+        other._tile = self._tile.lit(gain)
         return other
 
     def velocity(self, gaze: Gaze | None = None) -> tuple[float, float]:
@@ -111,28 +105,6 @@ class SlidingTexture:
         seconds = frame / self.frame_rate_hz
         pan, tilt = (gaze or AT_REST).at(frame)
         return self.velocity_px_s[0] * seconds - pan - 0.5, self.velocity_px_s[1] * seconds - tilt - 0.5
-
-    def _first_sample(self, frame: Any, gaze: Gaze | None) -> tuple[Any, Any]:
-        """(x, y) of the first pixel in the samples."""
-        x, y = (-SAMPLES_PER_PIXEL * (corner + 0.5) for corner in self.corner_at(frame, gaze))
-        return x, y
-
-    def _on(self, device: Any, frame: Floats, gaze: Gaze | None) -> Keyframes:
-        from scenes.flat.planes_on_device import repeated_on  # torch takes seconds
-
-        return repeated_on(
-            self._samples,
-            lambda samples: _in_order(samples, self._period),
-            frame,
-            self._first_sample(frame, gaze),
-            self.shape,
-            SAMPLES_PER_PIXEL,
-            device,
-        )
-
-    def _paint(self, frame: float, gaze: Gaze | None, picture: Pictures) -> None:
-        x, y = self._first_sample(frame, gaze)
-        _paint(self._samples, x % self._period, y % len(self._samples), picture)
 
 
 def _area_average(values: NDArray[np.floating], texel_px: float) -> Floats:
@@ -159,41 +131,6 @@ def _area_average(values: NDArray[np.floating], texel_px: float) -> Floats:
 
     average: Floats = (up_to(middle + half) - up_to(middle - half)) / (2 * half)
     return average
-
-
-def _by_phase(samples: Pictures, columns: int) -> Pictures:
-    """(rows, SAMPLES_PER_PIXEL, n): samples (rows, period) so that those a pixel apart are neighbours, on and on over
-    the period's end for as many columns as a picture has from any of them."""
-    period = samples.shape[1]
-    pixels = np.arange(np.lcm(period, SAMPLES_PER_PIXEL) // SAMPLES_PER_PIXEL + columns)
-    place = (SAMPLES_PER_PIXEL * pixels + np.arange(SAMPLES_PER_PIXEL)[:, None]) % period
-    return np.ascontiguousarray(samples[:, place])
-
-
-def _in_order(samples: Pictures, period: int) -> Pictures:
-    """(rows, period), of `_by_phase`."""
-    place = np.arange(period)
-    return samples[:, place % SAMPLES_PER_PIXEL, place // SAMPLES_PER_PIXEL]
-
-
-@njit(cache=True, nogil=True)
-def _paint(samples: Pictures, x: float, y: float, picture: Pictures) -> None:
-    """The picture whose first pixel is sample (x, y), bilinear; all pixels lie alike between samples."""
-    height, (rows, columns) = samples.shape[0], picture.shape
-    left, top = int(x), int(y)
-    right_share, lower_share = np.float32(x - left), np.float32(y - top)
-    here, place = left % SAMPLES_PER_PIXEL, left // SAMPLES_PER_PIXEL
-    right, beside = (left + 1) % SAMPLES_PER_PIXEL, (left + 1) // SAMPLES_PER_PIXEL
-    for r in range(rows):
-        upper = samples[(top + SAMPLES_PER_PIXEL * r) % height]
-        lower = samples[(top + SAMPLES_PER_PIXEL * r + 1) % height]
-        upper_left, upper_right = upper[here, place : place + columns], upper[right, beside : beside + columns]
-        lower_left, lower_right = lower[here, place : place + columns], lower[right, beside : beside + columns]
-        row = picture[r]
-        for c in range(columns):
-            above = upper_left[c] + right_share * (upper_right[c] - upper_left[c])
-            below = lower_left[c] + right_share * (lower_right[c] - lower_left[c])
-            row[c] = above + lower_share * (below - above)
 
 
 def _check(

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 import torch
 
+from scenes.flat.collage import Collage
 from scenes.flat.discs import Disc, Discs, PiecewisePath
 from scenes.flat.disk import RotatingDisk
 from scenes.flat.painted_disk import Texels, prefiltered
@@ -44,6 +45,7 @@ SCENES = {
     "drifting": lambda: RotatingDisk(SHAPE, rpm=-8000.0, centre=(3.2, 50.1), drift_px_s=(9000.0, -4000.0)),
     "flat background": lambda: RotatingDisk(SHAPE, background=0.1).lit(0.1),
     "discs": discs,
+    "collage": lambda: Collage(SHAPE, 3, speed=2.0),
     "sliding": lambda: SlidingTexture(SHAPE, (23_000.0, -7_000.0)),
     "sliding, coarse": lambda: SlidingTexture(SHAPE, (-9_000.0, 100.0), np.eye(5), texel_px=3.1).lit(0.5),
 }
