@@ -7,6 +7,7 @@ one go, so that a network runs once for MUS and accumulation.
     TFP, SSML, ...     the paper's pipelines: every frame reconstructed, then spikes by the noise-free camera, which is
                        `denoiser.decoders.accumulate`
     paper, best, ...   rate planes of an `OnlineDnSS`, from the stream's first frame on
+    picture            of every frame the picture that a stream of pictures shows of it, each TYPICAL_STEP frames
     light              the true light through a decoder: the score of a perfect network
 """
 
@@ -78,8 +79,10 @@ ROWS: dict[str, Row] = {
     "paper": Row("paper, accumulated", "paper", "accumulate", True),
     "best": Row("best", "best", "accumulate", True),
     "fast": Row("fast", "fast", "accumulate", True),
+    "picture": Row("picture", "picture", "accumulate", True),
     "best-overlap": Row("best, passes overlapped", "best-overlap", "accumulate", True),
     "best-map": Row("best with calibration", "best-map", "accumulate", True),
+    "picture-map": Row("picture with calibration", "picture-map", "accumulate", True),
     "clean": Row("clean twin", "clean"),
     "light-held": Row("true light, intervals kept", "light", "held"),
     "light-mus": Row("true light, MUS", "light", "mus"),
@@ -243,6 +246,22 @@ def _calibrated(case: StreamCase, exposed: ExposedStreams, path: Path) -> Planes
     return _judged_planes(OnlineDnSS.from_file(path, unit=calibrated(case)), exposed)
 
 
+def _pictured(case: StreamCase, exposed: ExposedStreams, path: Path, *, mapped: bool = False) -> Planes:
+    """As many streams as a step has frames, each a frame later: every frame is shown by one of them."""
+    planes = np.empty((exposed.stop - exposed.first, *exposed.noisy.shape[1:]), np.float32)
+    like = OnlineDnSS.from_file(path, unit=calibrated(case) if mapped else None)
+    step, late = like.engine.step, like.latency + 1
+    for phase in range(step):
+        begins = exposed.first + late + phase  # the end of a step, from which this stream's steps follow
+        stream = exposed.noisy[begins % step : exposed.stop + late]
+        pictures = like.another().push(stream)
+        for number, picture in enumerate(np.asarray(pictures)):
+            frame = begins % step + (number + 1) * step - late
+            if exposed.first <= frame < exposed.stop:
+                planes[frame - exposed.first] = picture
+    return planes
+
+
 def _pipeline(name: str) -> Callable[[StreamCase, ExposedStreams, Path], Planes]:
     return lambda case, exposed, path: reconstruct_many(
         name, exposed.noisy, range(exposed.first, exposed.stop), weights=path
@@ -267,6 +286,8 @@ SOURCES = {
     **{name: Source(_denoised, name) for name in (*MODES, "paper-no-refine")},
     "best-overlap": Source(partial(_denoised, overlap=True), "best"),
     "best-map": Source(_calibrated, "best"),
+    "picture": Source(_pictured, "picture"),
+    "picture-map": Source(partial(_pictured, mapped=True), "picture"),
     **{name: Source(_pipeline(name), name) for name in LEARNED},
     "tfp41": Source(_pipeline("tfp41")),
     "light": Source(_light),
