@@ -95,10 +95,7 @@ class Collage(PlanarScene):
         return {f"shape-{n}": layer.at(frame, gaze, self.shape) for n, layer in enumerate(self._shapes, 1)}
 
     def truth(self, frame: float, gaze: Gaze | None = None) -> Truth:
-        """Radiance, flow [pixels/frame], object number (0: background, then the shapes from the back), and poses.
-
-        A shape's pose is (x, y) of its middle [pixels] and its angle, clockwise in the picture [radians].
-        """
+        """Object n is the n-th shape from the back, its pose (x, y) [pixels] and its angle, clockwise [radians]."""
         truth = super().truth(frame, gaze)
         shapes = self.placed_discs(frame, gaze or AT_REST).items()
         return replace(truth, poses=truth.poses | {name: (*shape.centre, -shape.angle) for name, shape in shapes})
