@@ -41,6 +41,7 @@ from denoiser.training.rollout import MAP_ERRORS, OFFSET, STEADY
 from denoiser.training.simulated import Bank
 from denoiser.training.training_source import HeldOut, TrainingSource
 from scenes.flat.collage import Collage
+from scenes.flat.planes import painted_planes
 from scenes.protocol import Gaze
 from scenes.textures import Texture
 from spikecam_env.sensor import Keyframes, SpikeSensor
@@ -119,10 +120,9 @@ def simulated_stream(rng: np.random.Generator, size: int, textures: list[Texture
     frames = np.arange(0, FRAMES + every, every, dtype=np.float64)
     times, brightness = _course(rng, frames)
     heading = rng.uniform(0, 2 * math.pi)
-    along = pan * times[:, None] * np.asarray([math.cos(heading), math.sin(heading)])
-    pictures = np.empty((len(frames), size, size), np.float32)
-    for i, (time, (x, y)) in enumerate(zip(times.tolist(), along.tolist(), strict=True)):
-        pictures[i] = scene.radiance(time, time, Gaze.fixed(x, y)).radiance[0] * np.float32(brightness[i])
+    path = 2.0 * FRAMES * pan
+    gaze = Gaze((0.0, 0.0), (path * math.cos(heading), path * math.sin(heading)), (0.0, 2.0 * FRAMES))
+    pictures = painted_planes([scene.plane_at(times, gaze)])[0].radiance * brightness[:, None, None]
     keys = Keyframes(frames, pictures)
     sensor = SpikeSensor(draw_model(rng), shape=(size, size), seed=int(rng.integers(2**31)))
     law = fast.PixelLaw.of(sensor.unit)
@@ -140,7 +140,7 @@ def _course(rng: np.random.Generator, frames: Floats) -> tuple[Floats, Floats]:
     stretch = np.searchsorted(ends, np.arange(frames[-1] + 1), side="right")
     times = np.concatenate([[0.0], np.cumsum(pace[stretch])])
     at = frames.astype(np.int64)
-    return times[at], levels[np.searchsorted(ends, at, side="right")]
+    return times[at], levels[np.searchsorted(ends, at, side="right")].astype(np.float32)
 
 
 def _even(rng: np.random.Generator, limits: tuple[float, float]) -> float:
