@@ -122,7 +122,8 @@ def simulated_stream(rng: np.random.Generator, size: int, textures: list[Texture
     heading = rng.uniform(0, 2 * math.pi)
     path = 2.0 * FRAMES * pan
     gaze = Gaze((0.0, 0.0), (path * math.cos(heading), path * math.sin(heading)), (0.0, 2.0 * FRAMES))
-    pictures = painted_planes([scene.plane_at(times, gaze)])[0].radiance * brightness[:, None, None]
+    painted = painted_planes([scene.plane_at(times, gaze)])[0].radiance
+    pictures = np.multiply(painted, brightness[:, None, None], dtype=np.float32)
     keys = Keyframes(frames, pictures)
     sensor = SpikeSensor(draw_model(rng), shape=(size, size), seed=int(rng.integers(2**31)))
     law = fast.PixelLaw.of(sensor.unit)

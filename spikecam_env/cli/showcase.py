@@ -139,33 +139,49 @@ def comparison(run: Streamed) -> list[dict[str, Any]]:
 
     Columns `light` compare pictures with the true light: TFP 21, TFP 41, and one instant (TFI; of a denoiser its rate
     plane).  Columns `twin` compare TFP pictures with the clean twin's.  Motion blurs a TFP picture of a fast disk, 41
-    frames are 24 pixels at the rim, so the clean twin's row is the limit of the others.
+    frames are 24 pixels at the rim, so the clean twin's row is the limit of the others.  `picture` gives one picture of
+    each block, and no stream for TFP.
 
     Returns:
-        Rows of noisy, denoised in both modes, and clean twin.
+        Rows of noisy, denoised in three modes with their speed, and clean twin.
     """
     first = BLOCK * max(FIRST_SHOWN, (len(run.light) - TABLE_FRAMES // BLOCK) // 2)
     noisy, clean = (spikes[first : first + TABLE_FRAMES] for spikes in (run.noisy, run.clean))
-    streams: dict[str, tuple[Spikes, Pictures | None]] = {"noisy": (noisy, None)}
+    judged = range(2 * BLOCK + BLOCK // 2, len(noisy) - 2 * BLOCK, BLOCK)
+    instants: dict[str, dict[int, Pictures]] = {
+        name: {at: middleTFI(spikes, at) for at in judged} for name, spikes in (("noisy", noisy), ("clean twin", clean))
+    }
+    streams, seconds = {"noisy": noisy, "clean twin": clean}, {}
     for mode in ("paper", "best"):
-        online = OnlineDnSS.pretrained(mode, output="both")
-        streams[mode] = restored(online, noisy, f"compare ({mode})")[:2]
-    streams["clean twin"] = (clean, None)
+        online, began = OnlineDnSS.pretrained(mode, output="both"), time.perf_counter()
+        streams[mode], planes, _ = restored(online, noisy, f"compare ({mode})")
+        seconds[mode], instants[mode] = time.perf_counter() - began, {at: planes[at] for at in judged}
+    online = OnlineDnSS.pretrained("picture", step=BLOCK, look=BLOCK // 2)  # of the middle of each block
+    online.another().push(noisy[: 2 * BLOCK])  # compiled
+    began = time.perf_counter()
+    pictures: Any = online.push(noisy)
+    seconds["picture"] = time.perf_counter() - began
+    instants["picture"] = {at: pictures[at // BLOCK] for at in judged}
     rows = []
-    for name, (spikes, planes) in streams.items():
-        scores = []
-        for at in range(2 * BLOCK + BLOCK // 2, len(noisy) - 2 * BLOCK, BLOCK):
-            one = middleTFI(spikes, at) if planes is None else planes[at]
-            scores.append(_scores(one, spikes, clean, at, run.light[first + at]))
-        means = {measure: float(np.mean([score[measure] for score in scores])) for measure in scores[0]}
-        rows.append({"stream": name, **means})
+    for name in ("noisy", "paper", "best", "picture", "clean twin"):
+        scores = [_scores(instants[name][at], streams.get(name), clean, at, run.light[first + at]) for at in judged]
+        means = {measure: _mean([score[measure] for score in scores]) for measure in scores[0]}
+        rows.append({"stream": name, **means, "frames/s": len(noisy) / seconds[name] if name in seconds else None})
     return rows
 
 
-def _scores(one: Pictures, spikes: Spikes, clean: Spikes, at: int, light: Pictures) -> dict[str, float]:
+def _mean(values: list[float | None]) -> float | None:
+    known = [value for value in values if value is not None]
+    return float(np.mean(known)) if known else None
+
+
+def _scores(one: Pictures, spikes: Spikes | None, clean: Spikes, at: int, light: Pictures) -> dict[str, float | None]:
     """PSNR [dB] by column of `comparison`: of one instant's picture, and of means about a frame of a stream."""
-    scores = {"instant, light": light_db(one, light)}
+    scores: dict[str, float | None] = {"instant, light": light_db(one, light)}
     for window in (21, WINDOW):
+        if spikes is None:
+            scores[f"TFP {window}, light"] = scores[f"TFP {window}, twin"] = None
+            continue
         mean, twin = middleTFP(spikes, at, window), middleTFP(clean, at, window)
         scores[f"TFP {window}, light"] = light_db(mean, light)
         scores[f"TFP {window}, twin"] = psnr_db(mean, twin, float(light.max()))
