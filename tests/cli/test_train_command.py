@@ -59,7 +59,7 @@ def test_the_ablation(trained, tmp_path):
     [
         ("best", "--no-refine", "refine is for paper"),
         ("paper", "--channels 4 8 3", "channels is for best, fast"),
-        ("ssml", "--start best", "start is for best, fast, paper"),
+        ("ssml", "--start best", "start is for best, fast, paper, picture"),
         ("paper", "--teacher best", "teacher is for best, fast"),
         ("ssml", "--validate-passes 3", "validate-passes is for best, fast, paper"),
         ("fast", "--width 12", "width is for spk2img-clean, spk2img-noisy, ssml"),
