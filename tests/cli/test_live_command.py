@@ -121,20 +121,42 @@ def test_packed_frames_are_taken_from_standard_input(spikes: np.ndarray, capfd) 
 
 
 @pytest.mark.parametrize(
-    ("content", "said"),
+    ("mode", "content", "said"),
     [
-        (b"", "standard input ended before a frame had come, with 0 of 120 bytes"),
-        (bytes(100), "standard input ended before a frame had come, with 100 of 120 bytes"),
-        (bytes(120 * 31), "standard input ended after 31 frames; a picture needs 32"),
+        ("picture", b"", "standard input ended before a frame had come, with 0 of 120 bytes"),
+        ("picture", bytes(100), "standard input ended before a frame had come, with 100 of 120 bytes"),
+        ("best", bytes(120 * 31), "standard input ended after 31 frames; a picture needs 32"),
     ],
     ids=["empty", "cut", "short"],
 )
 @pytest.mark.parametrize("film", [(), ("--film", "a.mp4")], ids=["figures", "film"])
-def test_a_stream_without_a_picture_is_refused_in_a_line(content: bytes, said: str, film: tuple, capfd) -> None:
+def test_a_stream_without_a_picture_is_refused_in_a_line(
+    mode: str, content: bytes, said: str, film: tuple, capfd
+) -> None:
     with standard_input(content):
-        assert spikecam("live", "-", *SIZE, *film) == 2
+        assert spikecam("live", "-", *SIZE, *film, "--mode", mode) == 2
     assert capfd.readouterr().err.startswith(f"spikecam: {said}")
     assert not os.listdir()
+
+
+@pytest.mark.parametrize("film", [(), ("--film", "a.mp4")], ids=["figures", "film"])
+def test_a_recording_shorter_than_a_step_shows_its_picture(spikes: np.ndarray, film: tuple, capfd) -> None:
+    with standard_input(pack_frames(spikes[:31]).tobytes()):
+        assert spikecam("live", "-", *SIZE, *film) == 0
+    row = figures(capfd.readouterr().out)
+    assert (row["frames"], row["lost"], row["pictures"]) == (31, 0, 1)
+
+
+@pytest.mark.parametrize("mode", ["best", "fast"])
+def test_other_modes_skip_passes_for_which_they_are_too_slow(recording: Path, mode: str, capsys) -> None:
+    assert spikecam("live", recording, "--frames", 400, "--speed", 0.05, "--mode", mode, "--passes", 2) == 0
+    assert 1 <= figures(capsys.readouterr().out)["pictures"] <= 400 / 16
+
+
+def test_passes_are_not_of_mode_picture(recording: Path, capsys) -> None:
+    assert spikecam("live", recording, "--passes", 2) == 2
+    said = capsys.readouterr().err
+    assert said.startswith("spikecam: passes and plane are of other modes than 'picture'") and said.count("\n") == 1
 
 
 def test_a_wrong_size_of_a_pipes_frames_is_noticed(spikes: np.ndarray, capfd) -> None:
