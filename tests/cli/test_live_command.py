@@ -88,7 +88,8 @@ def test_without_a_display_the_figures_of_a_file_are_printed(recording: Path, ca
 def test_a_film_is_what_a_window_would_show(recording: Path, capsys, tmp_path: Path) -> None:
     """Noisy on the left, denoised on the right, as many pictures as the stream lasted."""
     film = tmp_path / "a.mp4"
-    assert spikecam("live", recording, "--loop", "--seconds", 1.5, "--speed", 0.02, "--film", film) == 0
+    options = ("--loop", "--seconds", 1.5, "--speed", 0.02, "--mode", "best")
+    assert spikecam("live", recording, *options, "--film", film) == 0
     printed = capsys.readouterr().out
     assert printed.endswith(f"wrote {film}\n")
     pictures = [picture[..., 0].astype(float) for picture in film_in(film)]
