@@ -5,7 +5,8 @@
 One thread may fill the ring; another takes frames out of it into the window, and runs the passes that they complete.
 
     mode `picture`   takes in every frame and runs every pass: its memory is of the whole stream.  Frames that the ring
-                     overwrites before they were taken in are lost, and the window begins anew.
+                     overwrites before they were taken in are lost: those of the step before them make a picture, and the
+                     window begins anew.
     other modes      run the newest pass for a picture.  Frames too far before it are left out: the window then begins
                      anew HISTORY frames before it.
 
@@ -72,6 +73,14 @@ class LiveDnSS:
     """Frames between the frame that a picture shows and the newest it needs; up to `step` - 1 more have come."""
     takes_every_frame: bool
     """Whether every frame is taken in and every pass is run, as in mode `picture`."""
+    window: AnyInput | None
+    """The network's input for the last picture; its `start` is a frame of the stream."""
+    rates: NDArray[np.float32] | None
+    """(planes, H, W) [spikes/frame], all frames of the last pass."""
+    _origin: int  # frame at which the window begins
+    _taken: int  # frame before which the window has all
+    _next: int  # frame before which the next pass ends
+    _is_new: bool  # whether there is a picture that was not asked for
 
     def __init__(
         self,
@@ -136,6 +145,7 @@ class LiveDnSS:
         """Frames that were overwritten before mode `picture` took them in."""
         self._window = self._engine.window(self.shape)
         self._carried: Carried = ()
+        self._forget()
         self._begin(0)
 
     def pace(self, frames_s: float, pictures_s: float) -> None:
@@ -178,7 +188,8 @@ class LiveDnSS:
 
     def noisy(self) -> NDArray[np.float32]:
         """(H, W) float32, the mean [spikes/frame] of NOISY frames about `frame`, or of those before the pass's end."""
-        return unpack_frames(self._about, self.shape).sum(axis=0, dtype=np.uint16) / np.float32(len(self._about))
+        spikes = unpack_frames(self._about, self.shape).sum(axis=0, dtype=np.uint16)
+        return np.asarray(spikes / np.float32(len(self._about)))
 
     def ready(self) -> bool:
         """Whether there are frames for a picture, and for another than the last."""
@@ -194,14 +205,18 @@ class LiveDnSS:
     def end(self) -> None:
         """The stream is over: in mode `picture`, frames that do not fill a step make a picture, too."""
         self._catch_up()
+        self._end()
+
+    def _end(self) -> None:
         if isinstance(self._window, PictureWindow):
             self._run(self._window.end())
 
     def _catch_up(self) -> None:
-        """Take in the frames that have come, and none that come meanwhile, unless these were overwritten."""
+        """Take in the frames that have come, and none that come meanwhile, but for a pass whose frames were
+        overwritten."""
         stop = self.count
         while (due := self._due(stop))[0] > self._taken:
-            if not self._take(*due):
+            if not self._take(*due) and not self.takes_every_frame:
                 stop = self.count
 
     def _due(self, stop: int) -> tuple[int, range]:
@@ -209,6 +224,7 @@ class LiveDnSS:
         window; begins anew where frames were lost, or are left out."""
         origin, _ = self.ring.extent
         if origin > self._origin:
+            self._forget()
             self._begin(origin)
         if self.takes_every_frame:
             return min(stop, self._taken + BLOCK, self._next), range(0)
@@ -222,10 +238,11 @@ class LiveDnSS:
         return newest, range(first - before, newest - before + 1, self.step)
 
     def _take(self, stop: int, wanted: range) -> bool:
-        """Take frames into the window, and run the passes that they complete; begins anew, and is false, where they
-        were overwritten."""
+        """Take frames into the window, and run the passes that they complete; where they were overwritten, makes a
+        picture of those before, begins anew, and is false."""
         packed = self.ring.packed(self._taken, stop)
         if not self.ring.holds(self._taken):
+            self._end()
             origin, newest = self.ring.extent
             begin = max(origin, newest - self._room // 2)
             if self.takes_every_frame:
@@ -248,20 +265,22 @@ class LiveDnSS:
             ((self.rates, self._carried),) = self._engine.run([window], [self._carried], self.shape)
             self._window.learn(cast("Any", window), self.rates)
             self.window = replace(window, start=self._origin + window.start)
-            self._await_pass(self._taken + self.step, is_new=True)
+            self._is_new = True
+            self._await_pass(self._taken + self.step)
 
     def _begin(self, frame: int) -> None:
         """Begin anew at a frame of the stream; gain and carried arrays stay."""
         self._window.begin_anew()
         self._origin = self._taken = frame
-        self._await_pass(frame + self.needed, is_new=False)
-        self.window: AnyInput | None = None
-        """The network's input for the last picture; its `start` is a frame of the stream."""
-        self.rates: NDArray[np.float32] | None = None
-        """(planes, H, W) [spikes/frame], all frames of the last pass."""
+        self._await_pass(frame + self.needed)
 
-    def _await_pass(self, stop: int, *, is_new: bool) -> None:
-        """The next pass ends before frame `stop`; is_new: whether there is a picture that was not shown."""
-        self._next, self._is_new = stop, is_new
+    def _forget(self) -> None:
+        """There is no picture of the stream as it goes on."""
+        self.window = self.rates = None
+        self._is_new = False
+
+    def _await_pass(self, stop: int) -> None:
+        """The next pass ends before frame `stop`."""
+        self._next = stop
         if isinstance(self._window, PictureWindow):
             self._window.step = self.step

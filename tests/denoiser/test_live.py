@@ -211,6 +211,18 @@ def test_frames_that_mode_picture_comes_too_late_for_are_lost_and_counted() -> N
     assert np.any(watching.window.planes[..., -2]) and not np.any(forgetful.window.planes[..., -2])
 
 
+def test_mode_picture_shows_what_it_had_of_a_step_whose_rest_was_overwritten() -> None:
+    spikes, watching = stream(1500), live("picture", step=500, room=600)
+    watching.push(pack_frames(spikes[:200]))
+    watching.take_in()
+    assert not watching.ready()
+    watching.push(pack_frames(spikes[200:]))
+    assert watching.ready()
+    (picture,) = online("picture", step=200).push(spikes[:200])
+    np.testing.assert_array_equal(watching.picture(), picture)
+    assert watching.lost == 1200 - 200 and watching.frame == 199 - watching.latency
+
+
 def test_pace_makes_so_many_pictures_a_second_where_no_step_was_given() -> None:
     steps = []
     for frames_s in (40_000, 300, 10, 1e6):
