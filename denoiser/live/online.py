@@ -5,8 +5,8 @@
 One thread may fill the ring; another takes frames out of it into the window, and runs the passes that they complete.
 
     mode `picture`   takes in every frame and runs every pass: its memory is of the whole stream.  Frames that the ring
-                     overwrites before they were taken in are lost: those of the step before them make a picture, and the
-                     window begins anew.
+                     overwrites before they were taken in are lost: those of the step before them make a picture, and
+                     the window begins anew.
     other modes      run the newest pass for a picture.  Frames too far before it are left out: the window then begins
                      anew HISTORY frames before it.
 
