@@ -1,4 +1,4 @@
-"""The denoiser of a stream that is watched: every frame is taken in, the network runs only for the pictures shown."""
+"""The denoiser of a stream that is watched: packed frames in, one picture of many frames out."""
 
 from denoiser.live.online import LiveDnSS
 

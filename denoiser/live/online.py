@@ -1,108 +1,136 @@
-"""Pictures of a stream as it comes: next to no work for a frame, a pass of the network for a picture.
+"""Pictures of a stream as it comes, at the instants at which a program calls for them.
 
-    packed frames -> ring -> window of the newest pass -> network -> (H, W) rate [spikes/frame]
+    packed frames -> ring -> window of the engine -> network -> (H, W) rate [spikes/frame]
 
-`OnlineDnSS` runs its network for every frame, or for every sixteen.  `LiveDnSS` keeps the last packed frames and does
-nothing else with them.  A picture is the newest pass of the network that these frames allow:
+One thread may fill the ring; another takes frames out of it into the window, and runs the passes that they complete.
 
-    its window      unpacked, with its planes (`denoiser.passes.window`)
-    its past        last spikes and running means, from the pass before on.  Where that is more than HISTORY frames ago:
-                    of the last HISTORY frames before the window, as if the stream had begun there.
-    gain, carried   as the pass before left them, however long ago that is
+    mode `picture`   takes in every frame and runs every pass: its memory is of the whole stream.  Frames that the ring
+                     overwrites before they were taken in are lost: those of the step before them make a picture, and
+                     the window begins anew.
+    other modes      run the newest pass for a picture.  Frames too far before it are left out: the window then begins
+                     anew HISTORY frames before it.
 
-Where every pass of a stream is run, pictures have the bits of `OnlineDnSS`.  Where passes are left out the network
-knows less of the past; `spikecam bench live` prints the cost.
+A window that begins anew keeps the gain, and the network its carried arrays.  Where every pass of a stream is run,
+pictures have the bits of `OnlineDnSS`; `spikecam bench live` prints the cost of passes that are left out.
 """
 
 from __future__ import annotations
 
 import os
+from collections.abc import Iterable
 from dataclasses import replace
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 from numpy.typing import NDArray
 
-from denoiser.live.past import Past
 from denoiser.live.ring import Ring
-from denoiser.passes.engine import Engine
+from denoiser.passes.engine import AnyInput, Engine
 from denoiser.passes.infer import Carried
-from denoiser.passes.window import PassWindow, RollingWindow
+from denoiser.passes.picture_window import STEPS, PictureWindow
+from denoiser.passes.recipe import PictureRecipe
 from denoiser.weights import load_weights
 from spikecam_env.checked import checked_count, checked_shape, checked_whole
 from spikecam_env.errors import InputError, NotReadyError
+from spikecam_env.streams.packing import unpack_frames
 
 HISTORY = 64
 """Frames before a window that its running means hold at least, where there are so many.  More change a picture by less
-than 0.1 dB and take 40 us a frame at 250 x 400; none cost 0.4 dB in the dark (`tumble` at mean interval 60)."""
+than 0.1 dB; none cost 0.4 dB in the dark (`tumble` at mean interval 60)."""
 ROOM = 4096
-"""Frames that are kept: a tenth of a second at 40 kHz, five times as long as it takes to read those of a picture."""
-_LONG = 1 << 20
-"""Age of a stream [frames] from which on it changes no bit of a running mean, 1 - (1 - 1/m)^age being 1."""
+"""Frames that are kept: a tenth of a second at 40 kHz."""
+NOISY = 41
+"""Frames of a noisy picture."""
+BLOCK = 256
+"""Frames that are taken out of the ring at a time, at most, in mode `picture`."""
+EXACT = 1 << 24
+"""Frames after which the window of another mode begins anew: float32 holds no greater number exactly."""
 
 
 class LiveDnSS:
-    """Denoised pictures of a stream of packed frames, at the instants at which a program calls for them.
-
-    One thread may push while another calls `picture`.
+    """Denoised pictures of a stream of packed frames.  One thread may push while another calls `picture`.
 
     Args:
         shape: (rows, columns).
-        mode: "best", "fast", "paper", or the path of a checkpoint.
-        passes: of the network for a picture, one after another; the last is shown.  More know more, and take longer.
-        plane: frame of a pass that a picture shows, 0 the oldest; default its middle, which the network knows best.
+        mode: "picture", "best", "fast", "paper", or the path of a checkpoint.
+        step: of mode `picture`: frames from a picture to the next, 8 to 4000; default 40, or as `pace` says.
+        look: of mode `picture`: age of a picture, 4 to 24 frames; default 12.
+        passes: of other modes: passes for a picture, one after another; the last is shown.  More know more, and take
+            longer.  Default 1.
+        plane: of other modes: frame of a pass that a picture shows, 0 the oldest; default its middle, which the network
+            knows best.
         room: frames that are kept.
         options: `precision` and `unit`, as of `OnlineDnSS`.
 
     Raises:
-        InputError: unknown options and unusable frames.
-        NotReadyError: a picture before the first window.
+        InputError: unknown options, options of another mode, and unusable frames.
+        NotReadyError: a picture before the first pass.
     """
+
+    step: int
+    """Frames from one pass to the next."""
+    latency: int
+    """Frames between the frame that a picture shows and the newest it needs; up to `step` - 1 more have come."""
+    takes_every_frame: bool
+    """Whether every frame is taken in and every pass is run, as in mode `picture`."""
+    window: AnyInput | None
+    """The network's input for the last picture; its `start` is a frame of the stream."""
+    rates: NDArray[np.float32] | None
+    """(planes, H, W) [spikes/frame], all frames of the last pass."""
+    _origin: int  # frame at which the window begins
+    _taken: int  # frame before which the window has all
+    _next: int  # frame before which the next pass ends
+    _is_new: bool  # whether there is a picture that was not asked for
 
     def __init__(
         self,
         shape: tuple[int, int],
-        mode: str | os.PathLike[str] = "best",
+        mode: str | os.PathLike[str] = "picture",
         *,
-        passes: int = 1,
+        step: int | None = None,
+        look: int | None = None,
+        passes: int | None = None,
         plane: int | None = None,
         room: int = ROOM,
         **options: Any,
     ) -> None:
         recipe, network, _ = load_weights(mode)
         self.shape = checked_shape(shape)
-        self._layout = recipe.layout
-        self._engine = Engine.of(recipe, network, **options)
+        self._engine = Engine.of(recipe, network, step=step, look=look, **options)
         self._engine.check_map(self.shape)
-        self._passes = checked_count(passes, "passes")
-        middle = self._layout.planes // 2
-        self._plane = middle if plane is None else checked_whole(plane, "plane", 0, self._layout.planes - 1)
-        least = 2 * (HISTORY + self._layout.span)
-        if checked_count(room, "room") < least:
-            raise InputError(f"room is {room}; it must be a whole number, {least} or more")
+        self._passes = checked_count(1 if passes is None else passes, "passes")
+        self._has_own_step = step is not None
+        self.takes_every_frame = isinstance(recipe, PictureRecipe)
+        if isinstance(recipe, PictureRecipe):
+            if (passes, plane) != (None, None):
+                raise InputError("passes and plane are of other modes than 'picture'; leave them out")
+            self.step, self.latency = self._engine.step, self._engine.look
+            self._plane, self._future, self._reach = 0, 0, HISTORY
+        else:
+            layout = recipe.layout
+            self._plane = layout.planes // 2 if plane is None else checked_whole(plane, "plane", 0, layout.planes - 1)
+            self.step, self.latency, self._future = layout.planes, layout.latency - self._plane, layout.future
+            self._reach = self.needed - (-(HISTORY + layout.past) // self.step) * self.step
+        if checked_count(room, "room") < 2 * self._reach:
+            raise InputError(f"room is {room}; it must be a whole number, {2 * self._reach} or more")
         self._room = room
-        self._shares = np.float32(1.0) / np.asarray(self._layout.memories, np.float32)
         self.reset()
-
-    @property
-    def latency(self) -> int:
-        """Frames between the frame that a picture shows and the newest it needs; up to `step` - 1 more have come."""
-        return self._layout.planes + self._layout.future - 1 - self._plane
-
-    @property
-    def step(self) -> int:
-        """Frames from one pass to the next."""
-        return self._layout.planes
 
     @property
     def needed(self) -> int:
         """Frames that the first picture needs."""
-        return self._layout.planes + self._layout.future
+        return self.step + self._future
 
     @property
     def count(self) -> int:
         """Frames of the stream so far, those that were lost included."""
         return self.ring.extent[1]
+
+    @property
+    def free(self) -> int:
+        """Frames that may come before `picture` or `take_in` is called, and none is lost."""
+        waiting = self.count - self._taken if self.takes_every_frame else 0
+        return max(self._room - waiting, 0)
 
     @property
     def frame(self) -> int | None:
@@ -113,18 +141,26 @@ class LiveDnSS:
         """Forget the stream."""
         self.ring = Ring(self.shape, self._room)
         """Where frames are kept; a reader of files or sockets writes to it directly (`lend`, `took`)."""
-        self.window: PassWindow | None = None
-        """The network's input for the last picture; its `start` is a frame of the stream."""
-        self.rates: NDArray[np.float32] | None = None
-        """(planes, H, W) [spikes/frame], all frames of the last pass."""
-        self._past: Past | None = None
-        self._sums = np.zeros((2, *self.shape), np.float32)
+        self.lost = 0
+        """Frames that were overwritten before mode `picture` took them in."""
+        self._window = self._engine.window(self.shape)
         self._carried: Carried = ()
+        self._forget()
+        self._begin(0)
+
+    def pace(self, frames_s: float, pictures_s: float) -> None:
+        """Mode `picture` without a `step` of its own: make, from the next pass on, so many pictures a second of a
+        stream of so many frames a second."""
+        if self.takes_every_frame and not self._has_own_step:
+            self.step = min(max(round(frames_s / pictures_s), STEPS[0]), STEPS[1])
+            if not self._taken:
+                self._begin(0)
 
     def warm_up(self) -> None:
         """Do the slow work of the first pictures now, such as to compile; forgets the stream."""
-        for frames in (HISTORY + self._layout.span, self.step):  # the second goes on from the first
+        for frames in (self._reach, min(self.step, self._reach)):  # the second goes on from the first
             self.ring.push(np.zeros((frames, self.ring.rows.shape[1]), np.uint8))
+            self.end()
             self.picture()
         self.reset()
 
@@ -142,76 +178,109 @@ class LiveDnSS:
         Raises:
             NotReadyError: there are fewer frames than a pass needs.
         """
-        while not self._is_shown(newest := self._newest()):
-            if all(self._pass(newest[0], start) for start in self._due(*newest)):
-                break
-        assert self.rates is not None
+        self._catch_up()
+        if self.rates is None:
+            frames = self.count - self._origin
+            raise NotReadyError(f"{frames} frames have come; the first picture needs {self.needed}, push more")
+        self._is_new = False
         picture: NDArray[np.float32] = self.rates[self._plane]
         return picture
 
+    def noisy(self) -> NDArray[np.float32]:
+        """(H, W) float32, the mean [spikes/frame] of NOISY frames about `frame`, or of those before the pass's end."""
+        spikes = unpack_frames(self._about, self.shape).sum(axis=0, dtype=np.uint16)
+        return np.asarray(spikes / np.float32(len(self._about)))
+
     def ready(self) -> bool:
         """Whether there are frames for a picture, and for another than the last."""
-        newest = self._newest_or_none()
-        return newest is not None and not self._is_shown(newest)
-
-    def _is_shown(self, newest: tuple[int, int]) -> bool:
-        return self.window is not None and self.window.start == newest[1]
-
-    def _newest_or_none(self) -> tuple[int, int] | None:
-        """First frame of the stream, and of its newest whole pass."""
         origin, stop = self.ring.extent
-        passes = (stop - origin - self._layout.future) // self.step
-        return (origin, origin + (passes - 1) * self.step) if passes > 0 else None
+        return self._is_new or stop >= (origin + self.needed if origin > self._origin else self._next)
 
-    def _newest(self) -> tuple[int, int]:
-        newest = self._newest_or_none()
-        if newest is None:
-            origin, stop = self.ring.extent
-            raise NotReadyError(f"{stop - origin} frames have come; the first picture needs {self.needed}, push more")
-        return newest
+    def take_in(self) -> None:
+        """Mode `picture`: do the work for the frames that have come, as `picture` does.  One of both has to be called
+        before `room` frames wait."""
+        if self.takes_every_frame:
+            self._catch_up()
 
-    def _due(self, origin: int, newest: int) -> range:
-        """First frames of the passes to run for a picture: the last `passes`, but for those that were run."""
-        first = max(origin, newest - (self._passes - 1) * self.step)
-        if self.window is not None:
-            first = max(first, self.window.start + self.step)
-        return range(first, newest + 1, self.step)
+    def end(self) -> None:
+        """The stream is over: in mode `picture`, frames that do not fill a step make a picture, too."""
+        self._catch_up()
+        self._end()
 
-    def _pass(self, origin: int, start: int) -> bool:
-        """Run the pass at frame `start` of a stream that begins at `origin`, and keep its rates and state; false
-        where its frames were overwritten meanwhile."""
-        first, stop = max(start - self._layout.past, origin), start + self.step + self._layout.future
-        past = self._past_before(first, origin)
-        oldest = past.stop
-        past.advance(self.ring.rows, first, self._shares)
-        spikes = self.ring.unpacked(first, stop)
-        if not self.ring.holds(oldest):
-            self._past = None
+    def _end(self) -> None:
+        if isinstance(self._window, PictureWindow):
+            self._run(self._window.end())
+
+    def _catch_up(self) -> None:
+        """Take in the frames that have come, and none that come meanwhile, but for a pass whose frames were
+        overwritten."""
+        stop = self.count
+        while (due := self._due(stop))[0] > self._taken:
+            if not self._take(*due) and not self.takes_every_frame:
+                stop = self.count
+
+    def _due(self, stop: int) -> tuple[int, range]:
+        """The frame up to which frames are to be taken in next, and the passes to run by their first frame in the
+        window; begins anew where frames were lost, or are left out."""
+        origin, _ = self.ring.extent
+        if origin > self._origin:
+            self._forget()
+            self._begin(origin)
+        if self.takes_every_frame:
+            return min(stop, self._taken + BLOCK, self._next), range(0)
+        newest = self._next + (stop - self._next) // self.step * self.step
+        if newest < self._next:
+            return self._taken, range(0)
+        first = max(self._next, newest - (self._passes - 1) * self.step)
+        if first - self._reach > self._taken or newest - self._origin > EXACT:
+            self._begin(max(first - self._reach, origin))
+        before = self._origin + self.needed
+        return newest, range(first - before, newest - before + 1, self.step)
+
+    def _take(self, stop: int, wanted: range) -> bool:
+        """Take frames into the window, and run the passes that they complete; where they were overwritten, makes a
+        picture of those before, begins anew, and is false."""
+        packed = self.ring.packed(self._taken, stop)
+        if not self.ring.holds(self._taken):
+            self._end()
+            origin, newest = self.ring.extent
+            begin = max(origin, newest - self._room // 2)
+            if self.takes_every_frame:
+                self.lost += begin - max(origin, self._taken)
+            self._begin(begin)
             return False
-        self._past, zero = past, max(past.first, first - _LONG)
-        rolling = RollingWindow(self._layout, self.shape, self._engine.unit)
-        rolling.restore(
-            {
-                "start": start - zero,
-                "seen": stop - zero,
-                "frames": spikes,
-                "last": past.last_since(zero).reshape(self.shape),
-                "means": past.means.reshape(-1, *self.shape),
-                "averaged": first - zero,
-                "sums": self._sums,
-            }
-        )
-        window = next(rolling.push(spikes[:0]))
-        ((self.rates, self._carried),) = self._engine.run([window], [self._carried])
-        rolling.learn(window, self.rates)
-        self._sums = rolling.state()["sums"]
-        self.window = replace(window, start=start)
+        self._taken = stop
+        if isinstance(self._window, PictureWindow):
+            self._run(self._window.push_packed(packed))
+        else:
+            self._run(self._window.push(unpack_frames(packed, self.shape), wanted))
         return True
 
-    def _past_before(self, first: int, origin: int) -> Past:
-        """The past to go on from to frame `first`: that of the pass before, or a new one."""
-        past = self._past
-        if past is not None and past.first >= origin and 0 <= first - past.stop <= HISTORY:
-            return past
-        pixels = self.shape[0] * self.shape[1]
-        return Past.nothing(max(origin, first - HISTORY), pixels, len(self._shares))
+    def _run(self, windows: Iterable[AnyInput]) -> None:
+        """Run the network for these windows, and keep the last and its rates."""
+        for window in windows:
+            frame = self._origin + window.start + self._plane
+            stop = min(frame + min(self.latency, NOISY // 2) + 1, self._taken)
+            self._about = self.ring.packed(max(stop - NOISY, self._origin), stop)
+            ((self.rates, self._carried),) = self._engine.run([window], [self._carried], self.shape)
+            self._window.learn(cast("Any", window), self.rates)
+            self.window = replace(window, start=self._origin + window.start)
+            self._is_new = True
+            self._await_pass(self._taken + self.step)
+
+    def _begin(self, frame: int) -> None:
+        """Begin anew at a frame of the stream; gain and carried arrays stay."""
+        self._window.begin_anew()
+        self._origin = self._taken = frame
+        self._await_pass(frame + self.needed)
+
+    def _forget(self) -> None:
+        """There is no picture of the stream as it goes on."""
+        self.window = self.rates = None
+        self._is_new = False
+
+    def _await_pass(self, stop: int) -> None:
+        """The next pass ends before frame `stop`."""
+        self._next = stop
+        if isinstance(self._window, PictureWindow):
+            self._window.step = self.step

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from spikecam_env.errors import InputError
-from spikecam_env.streams.packing import packed_bytes, unpack_frames
+from spikecam_env.streams.packing import packed_bytes
 
 
 class Ring:
@@ -62,6 +62,6 @@ class Ring:
         """Whether a frame of the extent, and all after it, are not overwritten, nor about to be."""
         return self._lent - frame <= len(self.rows)
 
-    def unpacked(self, first: int, stop: int) -> NDArray[np.uint8]:
-        """(stop - first, H, W) uint8 of 0 and 1."""
-        return unpack_frames(self.rows[np.arange(first, stop) % len(self.rows)], self.shape)
+    def packed(self, first: int, stop: int) -> NDArray[np.uint8]:
+        """(stop - first, ceil(H W / 8)) a copy of these frames."""
+        return self.rows[np.arange(first, stop) % len(self.rows)]

@@ -5,6 +5,10 @@
 The reader takes a source that waits, a file, at the pace of a camera that sends it.  Frames that it has not taken
 BUFFER_S after they were due are lost, and counted; the last that a picture needs are taken, however late.  Other
 sources are read as fast as they bring frames, and wait where that is too slow.
+
+Mode `picture` takes every frame in between pictures.  A file's frames that the ring has no room for are lost; other
+sources wait.  Its pictures come `pictures` a second at the source's rate, or at that of its first picture where the
+source is slower than its camera.  When the source is over, the frames that do not fill a step make the last picture.
 """
 
 from __future__ import annotations
@@ -28,7 +32,7 @@ PICTURES_S = 30.0
 BUFFER_S = 0.1
 """For which frames wait for a reader that is late [s]: 50 MB of a camera of 250 x 400 at 40 kHz."""
 LEAVE_S = 0.5
-"""For which a reader is waited for at the end [s]; one that waits for a sender may never come back."""
+"""For which a reader, or a watcher of the last picture, is waited for at the end [s]; either may never come back."""
 BLOCK = 256
 """Frames that are read at a time, at most."""
 TICK_S = 0.002
@@ -42,7 +46,7 @@ class Shown:
     rate: NDArray[np.float32]
     """(H, W) denoised [spikes/frame]."""
     noisy: NDArray[np.float32]
-    """(H, W) mean of the spikes over the window [spikes/frame]."""
+    """(H, W) mean of the spikes of some frames about it [spikes/frame]."""
     frame: int
     """The frame that the picture shows."""
     latency_s: float
@@ -120,14 +124,15 @@ class Session:
         if live.shape != source.shape:
             raise InputError(f"the denoiser is of frames of {live.shape}, {source.title} has {source.shape}")
         self.live = live
-        self._source, self._period_s = source, 1.0 / pictures
-        self._rate = speed * source.frame_rate_hz if source.waits else None
+        self._source, self._pictures_s = source, pictures
+        self._frames_s = speed * source.frame_rate_hz
         self._most, self._seconds = frames, seconds
         self._stop, self._read_all, self._denoised_all = threading.Event(), threading.Event(), threading.Event()
         self._reader = threading.Thread(target=self._run, args=(self._read, self._read_all), daemon=True)
         self._denoiser = threading.Thread(target=self._run, args=(self._denoise, self._denoised_all), daemon=True)
         self._changed = threading.Condition()
         self._shown: Shown | None = None
+        self._seen: Shown | None = None  # the last that was asked for
         self._error: BaseException | None = None
         self._arrivals: deque[tuple[int, float]] = deque(maxlen=4096)
         self._start_s = self._ended_s = 0.0
@@ -136,6 +141,7 @@ class Session:
 
     def __enter__(self) -> Session:
         self.live.warm_up()  # else frames would be lost meanwhile
+        self.live.pace(self._frames_s, self._pictures_s)
         self._reader.start()
         self._denoiser.start()
         return self
@@ -159,12 +165,14 @@ class Session:
     def figures(self) -> Figures:
         until = self._ended_s if self._denoised_all.is_set() else time.perf_counter()
         seconds = until - self._start_s if self._start_s else 0.0
-        return Figures(seconds, self._taken, self._lost, self._pictures, self._latency_s)
+        return Figures(seconds, self._taken, self._lost + self.live.lost, self._pictures, self._latency_s)
 
     def newest(self, after: Shown | None, timeout_s: float) -> Shown | None:
         """The newest picture, once it is another than `after`, within a time; None where there is none."""
         with self._changed:
             self._changed.wait_for(lambda: self._shown is not after or self.over, timeout_s)
+            self._seen = self._shown
+            self._changed.notify_all()
             return None if self._shown is after else self._shown
 
     def _run(self, work: Callable[[], object], done: threading.Event) -> None:
@@ -198,12 +206,12 @@ class Session:
 
     def _due(self) -> int:
         """Frames that may be read now; those that are overdue are skipped."""
-        if self._rate is None:
-            return BLOCK
+        if not self._source.waits:
+            return min(BLOCK, self.live.free)
         now = time.perf_counter()
         self._start_s = self._start_s or now
-        due = int((now - self._start_s) * self._rate) - self._taken - self._lost
-        late = due - int(BUFFER_S * self._rate)
+        due = int((now - self._start_s) * self._frames_s) - self._taken - self._lost
+        late = due - int(BUFFER_S * self._frames_s)
         if late > 0 and (lost := self._source.skip(late, keep=self.live.needed)):
             self.live.skip(lost)
             self._lost += lost
@@ -218,25 +226,32 @@ class Session:
         self._arrivals.append((self.live.count, now))
 
     def _denoise(self) -> None:
-        due_s = 0.0
+        due_s, period_s = 0.0, 1.0 / self._pictures_s
         while not self._is_time_up():
+            is_last = self._read_all.is_set()
+            self.live.take_in()
+            if is_last:
+                self.live.end()
             now = time.perf_counter()
-            if now >= due_s and self.live.ready():
+            if self.live.ready() and (now >= due_s - period_s / 2 or is_last):
                 self._show()
-                due_s = max(due_s + self._period_s, now)
-            elif self._read_all.is_set() and not self.live.ready():
-                return
+                due_s = max(due_s + period_s, now)
+            elif is_last:
+                break
             else:
                 time.sleep(TICK_S)
+        with self._changed:  # whoever watches may be about to ask for the last
+            self._changed.wait_for(lambda: self._seen is self._shown or self._stop.is_set(), LEAVE_S)
 
     def _show(self) -> None:
         try:
             rate = self.live.picture()
         except NotReadyError:  # frames were lost since it was ready
             return
-        window, frame = self.live.window, self.live.frame
-        assert window is not None and frame is not None
-        noisy = window.spikes.sum(axis=0, dtype=np.uint16) / np.float32(len(window.spikes))
+        noisy, frame = self.live.noisy(), self.live.frame
+        assert frame is not None
+        if not self._source.waits and not self._pictures:
+            self.live.pace(min(self._frames_s, self.figures.frames_per_s), self._pictures_s)
         latency_s = time.perf_counter() - self._came_at(frame)
         self._latency_s += latency_s
         self._pictures += 1

@@ -203,6 +203,13 @@ class PictureWindow:
         self._last = picture.copy()
         self._pictures += 1
 
+    def begin_anew(self) -> None:
+        """Frames were lost: the next is the first of a stream.  The gain and the last picture stay."""
+        self.seen = self._in_step = 0
+        self._held = self._held[:0]
+        for array in (self._bits, self._before, self._means):
+            array[:] = 0
+
     def state(self) -> dict[str, Any]:
         """A copy of everything on which later passes depend."""
         arrays = {name: getattr(self, f"_{name}").copy() for name in _ARRAYS}

@@ -133,6 +133,12 @@ class RollingWindow:
             self._sums[0] += covered.sum(axis=0, dtype=np.float32)
             self._sums[1] += rates.sum(axis=0)
 
+    def begin_anew(self) -> None:
+        """Frames were lost: the next is the first of a stream.  The sums for the gain stay."""
+        self.start = self.seen = self._averaged = 0
+        self._frames = self._frames[:0]
+        self._last[:], self._means[:] = -1, 0.0
+
     def state(self) -> dict[str, Any]:
         """A copy of everything on which later passes depend."""
         return {

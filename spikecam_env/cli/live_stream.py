@@ -6,12 +6,11 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Literal
 
 import tyro
 
 from spikecam_env.cli.camera import CameraOptions
-from spikecam_env.cli.mode_weights import Mode
 from spikecam_env.cli.options import Size
 from spikecam_env.cli.reading import ReadingOptions
 from spikecam_env.errors import InputError, unknown_name
@@ -29,7 +28,7 @@ READ_AHEAD = 2.0
 
 @dataclass
 class Live:
-    """Watch a spike stream as it comes, denoised: every frame is taken in, the network runs for the pictures shown.
+    """Watch a spike stream as it comes, denoised: every frame is taken in, and a picture knows all before it.
 
     In a window where there is a display (Esc ends), as a film with --film; else the figures alone: frames a second that
     came, pictures a second, frames that were lost, and the latency.
@@ -54,13 +53,15 @@ class Live:
     loop: bool = False
     """Begin a file again when it is over."""
     pictures: Annotated[float, Range(0.01, MOST_PICTURES_S)] = 30.0
-    """Pictures a second, at most."""
-    mode: Mode = "best"
-    """Which DnSS."""
+    """Pictures a second, at most.  Mode `picture` makes so many at the stream's frame rate and --speed, each of 8 to
+    4000 frames."""
+    mode: Literal["picture", "best", "fast", "paper"] = "picture"
+    """Which DnSS.  `picture` uses every frame; the others skip those for which they are too slow."""
     weights: Path | None = None
     """A checkpoint of `spikecam train` instead of the mode's shipped weights."""
-    passes: Count = 1
-    """Passes of the network for a picture; more passes use more of the frames before it, and take longer."""
+    passes: Count | None = None
+    """Not for `picture`: passes of the network for a picture, 1 by default; more passes use more of the frames before
+    it, and take longer."""
     calibration: Path | None = None
     """Not for `paper`: maps.h5 of `spikecam calibrate`, or its folder: the camera's fixed pattern is then taken out."""
     size: Size = (250, 400)

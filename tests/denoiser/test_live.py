@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 
 from denoiser.live import LiveDnSS
-from denoiser.live.past import Past
 from denoiser.online import OnlineDnSS
 from denoiser.passes.recipe import RECIPES, recipe_of
 from denoiser.passes.window import RollingWindow
@@ -151,34 +150,112 @@ def test_a_stream_of_hours_is_denoised_as_a_young_one() -> None:
     np.testing.assert_array_equal(*pictures.values())
 
 
-def test_an_old_past_is_that_of_a_young_one_but_for_its_age() -> None:
-    packed = pack_frames(stream(96))
-    shares = np.array([1 / 64], np.float32)
-    young, old = (Past.nothing(first, 117, 1) for first in (0, 96 * 10**8))
-    for past in (young, old):
-        past.advance(packed, past.first + 96, shares)
-    np.testing.assert_array_equal(young.means, old.means)
-    np.testing.assert_array_equal(young.last_since(0), old.last_since(old.first))
-    assert np.all(old.last_since(old.stop) <= 0)
-
-
 def test_frames_that_are_overwritten_while_a_picture_reads_them_are_not_shown() -> None:
     """The writer overtakes the reader once, in the middle of its reading; the picture is then of newer frames."""
     spikes, watching = stream(1400), live(room=700)
     packed = pack_frames(spikes)
     watching.push(packed[:400])
-    unpacked, calls = watching.ring.unpacked, []
+    rows, calls = watching.ring.packed, []
 
     def overtaken(first: int, stop: int) -> np.ndarray:
         calls.append(first)
         if len(calls) == 1:
             watching.push(packed[400:])
-        return unpacked(first, stop)
+        return rows(first, stop)
 
-    watching.ring.unpacked = overtaken
+    watching.ring.packed = overtaken
     watching.picture()
-    assert len(calls) == 2 and watching.frame > 1300
+    assert len(calls) > 1 and watching.frame > 1300 and watching.lost == 0
     np.testing.assert_array_equal(watching.window.spikes, spikes[watching.window.start - 16 :][:48])
+
+
+@pytest.mark.parametrize("step", [8, 40, 100])
+def test_mode_picture_runs_every_pass_however_seldom_a_picture_is_asked_for(step: int) -> None:
+    spikes, (often, seldom) = stream(1210), (live("picture", step=step) for _ in range(2))
+    pictures = online("picture", step=step).push(spikes)
+    for first in range(0, 1210, 7):
+        often.push(pack_frames(spikes[first : first + 7]))
+        if often.ready():
+            np.testing.assert_array_equal(often.picture(), pictures[(often.count // step) - 1])
+            assert often.frame == max(often.count // step * step - 1 - often.latency, 0)
+    seldom.push(pack_frames(spikes))
+    np.testing.assert_array_equal(seldom.picture(), pictures[-1])
+    assert seldom.frame == often.frame and seldom.lost == 0 and len(pictures) == 1210 // step
+
+
+def test_the_end_of_a_stream_shorter_than_a_step_is_a_picture() -> None:
+    spikes, watching, whole = stream(300), live("picture", step=200), online("picture", step=200)
+    rates = np.concatenate([whole.push(spikes), whole.flush()])
+    for first, stop in ((0, 60), (60, 300)):
+        short = live("picture", step=200)
+        short.push(pack_frames(spikes[:stop]))
+        watching.push(pack_frames(spikes[first:stop]))
+        short.end()
+        assert short.ready() and short.picture().shape == SHAPE and short.frame == stop - 1 - short.latency
+    watching.end()
+    np.testing.assert_array_equal(watching.picture(), rates[-1])
+    assert not watching.ready()
+
+
+def test_frames_that_mode_picture_comes_too_late_for_are_lost_and_counted() -> None:
+    """The stream then begins anew with the newest half of the ring; the gain stays."""
+    spikes, watching, forgetful = stream(1500), live("picture", step=200, room=400), live("picture", step=200)
+    for first in range(0, 600, 100):
+        watching.push(pack_frames(spikes[first : first + 100]))
+        watching.take_in()
+    watching.push(pack_frames(spikes[600:]))
+    assert watching.free == 0 and watching.ready()
+    forgetful.push(pack_frames(spikes[1300:]))
+    assert np.any(watching.picture() != forgetful.picture())
+    assert (watching.lost, watching.free, watching.frame) == (1300 - 600, 400, 1500 - 1 - watching.latency)
+    assert np.any(watching.window.planes[..., -2]) and not np.any(forgetful.window.planes[..., -2])
+
+
+def test_mode_picture_shows_what_it_had_of_a_step_whose_rest_was_overwritten() -> None:
+    spikes, watching = stream(1500), live("picture", step=500, room=600)
+    watching.push(pack_frames(spikes[:200]))
+    watching.take_in()
+    assert not watching.ready()
+    watching.push(pack_frames(spikes[200:]))
+    assert watching.ready()
+    (picture,) = online("picture", step=200).push(spikes[:200])
+    np.testing.assert_array_equal(watching.picture(), picture)
+    assert watching.lost == 1200 - 200 and watching.frame == 199 - watching.latency
+
+
+def test_pace_makes_so_many_pictures_a_second_where_no_step_was_given() -> None:
+    steps = []
+    for frames_s in (40_000, 300, 10, 1e6):
+        watching = live("picture")
+        watching.pace(frames_s, 30)
+        steps.append((watching.step, watching.needed))
+    assert steps == [(1333, 1333), (10, 10), (8, 8), (4000, 4000)]
+    given, other = live("picture", step=50), live("best")
+    for watching in (given, other):
+        watching.pace(40_000, 30)
+    assert (given.step, other.step) == (50, PLANES)
+
+
+def test_a_new_pace_holds_from_the_next_picture_on() -> None:
+    watching, frames = live("picture"), []
+    for count, frame in enumerate(stream(120)):
+        watching.push(pack_frames(frame[None]))
+        watching.take_in()
+        if count == 20:
+            watching.pace(300, 30)
+        if watching.ready():
+            watching.picture()
+            frames.append(watching.frame + watching.latency + 1)
+    assert frames == [40, 50, 60, 70, 80, 90, 100, 110, 120]
+
+
+@pytest.mark.parametrize(("mode", "ahead"), [("picture", 12), ("best", 20), ("paper", 20)])
+def test_the_noisy_picture_is_the_mean_of_41_frames_about_the_frame(mode: str, ahead: int) -> None:
+    spikes, watching = stream(160), live(mode)
+    watching.push(pack_frames(spikes))
+    watching.picture()
+    stop = watching.frame + ahead + 1
+    np.testing.assert_allclose(watching.noisy(), spikes[stop - 41 : stop].mean(axis=0), rtol=1e-6)
 
 
 def test_one_thread_pushes_while_another_asks_for_pictures() -> None:
@@ -231,8 +308,13 @@ def test_frames_that_are_not_packed_as_the_stream_are_refused(packed: object) ->
         ({"room": 223}, "room is 223"),
         ({"shape": (0, 4)}, "shape"),
         ({"precision": "float16"}, "precision"),
+        ({"step": 40}, "step and look are of mode 'picture'"),
+        ({"mode": "picture", "plane": 0}, "passes and plane are of other modes than 'picture'"),
+        ({"mode": "picture", "passes": 1}, "passes and plane are of other modes than 'picture'"),
+        ({"mode": "picture", "step": 7}, "step = 7"),
+        ({"mode": "picture", "look": 25}, "look = 25"),
     ],
 )
 def test_unusable_options_are_named(options: dict, message: str) -> None:
     with pytest.raises(InputError, match=message):
-        LiveDnSS(**{"shape": SHAPE, **options})
+        LiveDnSS(**{"shape": SHAPE, "mode": "best", **options})

@@ -51,6 +51,12 @@ class MadeUp:
 
 @pytest.fixture(scope="module")
 def live() -> LiveDnSS:
+    return LiveDnSS(SHAPE, "best", precision="float32")
+
+
+@pytest.fixture
+def every() -> LiveDnSS:
+    """Of mode `picture`."""
     return LiveDnSS(SHAPE, precision="float32")
 
 
@@ -144,6 +150,51 @@ def test_a_time_limit_holds_for_a_sender_that_has_fallen_silent(live: LiveDnSS) 
         begun = time.perf_counter()
         watched(session)
     assert time.perf_counter() - begun < 2.5
+
+
+def test_mode_picture_shows_so_many_pictures_a_second_and_the_frames_that_are_left(
+    every: LiveDnSS, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("denoiser.live.session.BUFFER_S", 10.0)
+    with Session(MadeUp(1050), every, pictures=20.0) as session:
+        seen = watched(session)
+    figures = session.figures
+    assert every.step == 100 and (figures.frames, figures.lost) == (1050, 0)
+    assert 1 <= figures.pictures <= 11 and figures.pictures <= 20.0 * figures.seconds + 2
+    assert seen[-1].frame == every.frame == 1050 - 1 - every.latency
+
+
+@pytest.mark.parametrize("waits", [True, False], ids=["file", "pipe"])
+@pytest.mark.parametrize("frames", [1, 31, 60])
+def test_a_recording_shorter_than_a_step_shows_a_picture(every: LiveDnSS, frames: int, waits: bool) -> None:
+    with Session(MadeUp(frames, waits=waits), every, pictures=20.0) as session:
+        seen = watched(session)
+    assert session.figures.pictures == 1 and seen[-1].frame == max(frames - 1 - every.latency, 0)
+
+
+def test_a_sender_waits_for_mode_picture_so_that_nothing_is_lost() -> None:
+    small = LiveDnSS(SHAPE, precision="float32", step=50, room=300)
+    with Session(MadeUp(6000, waits=False), small, pictures=1000.0) as session:
+        watched(session)
+    assert (session.figures.frames, session.figures.lost) == (6000, 0)
+    assert small.count == 6000 and small.frame == 6000 - 1 - small.latency
+
+
+def test_a_source_slower_than_its_camera_gets_shorter_steps(every: LiveDnSS) -> None:
+    """Its first picture is of 40 000 / 30 frames; 2000 come in a second."""
+    source = MadeUp(4000, waits=True)
+    source.waits, source.frame_rate_hz = False, 40_000.0
+    read = source.read
+
+    def slowly(rows: np.ndarray) -> int:
+        time.sleep(0.01)
+        return read(rows[:20])
+
+    source.read = slowly
+    with Session(source, every) as session:
+        watched(session)
+    print(f"{session.figures}; steps of {every.step} frames")
+    assert every.step < 300 and session.figures.pictures > 4
 
 
 def test_a_stream_that_breaks_says_so_to_whoever_watches(live: LiveDnSS) -> None:
