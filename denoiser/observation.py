@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 
 from denoiser.many import ManyDnSS
 from denoiser.online import OnlineDnSS
-from denoiser.passes.picture_window import STEPS
+from denoiser.passes.pixel_history import STEPS
 from denoiser.passes.recipe import MODES, PictureRecipe
 from denoiser.weights import load_weights
 from spikecam_env.checked import checked_number

@@ -273,7 +273,7 @@ def _light(case: StreamCase, exposed: ExposedStreams, path: Path) -> Planes:
     return np.ascontiguousarray(exposed.light)
 
 
-class Source(NamedTuple):
+class RowSource(NamedTuple):
     """The planes of some rows."""
 
     make: Callable[[StreamCase, ExposedStreams, Path], Planes]
@@ -283,12 +283,12 @@ class Source(NamedTuple):
 
 
 SOURCES = {
-    **{name: Source(_denoised, name) for name in (*MODES, "paper-no-refine")},
-    "best-overlap": Source(partial(_denoised, overlap=True), "best"),
-    "best-map": Source(_calibrated, "best"),
-    "picture": Source(_pictured, "picture"),
-    "picture-map": Source(partial(_pictured, mapped=True), "picture"),
-    **{name: Source(_pipeline(name), name) for name in LEARNED},
-    "tfp41": Source(_pipeline("tfp41")),
-    "light": Source(_light),
+    **{name: RowSource(_denoised, name) for name in (*MODES, "paper-no-refine")},
+    "best-overlap": RowSource(partial(_denoised, overlap=True), "best"),
+    "best-map": RowSource(_calibrated, "best"),
+    "picture": RowSource(_pictured, "picture"),
+    "picture-map": RowSource(partial(_pictured, mapped=True), "picture"),
+    **{name: RowSource(_pipeline(name), name) for name in LEARNED},
+    "tfp41": RowSource(_pipeline("tfp41")),
+    "light": RowSource(_light),
 }

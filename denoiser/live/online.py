@@ -27,7 +27,7 @@ from numpy.typing import NDArray
 from denoiser.live.ring import Ring
 from denoiser.passes.engine import AnyInput, Engine
 from denoiser.passes.infer import Carried
-from denoiser.passes.picture_window import STEPS, PictureWindow
+from denoiser.passes.pixel_history import STEPS, PixelHistory
 from denoiser.passes.recipe import PictureRecipe
 from denoiser.weights import load_weights
 from spikecam_env.checked import checked_count, checked_shape, checked_whole
@@ -208,7 +208,7 @@ class LiveDnSS:
         self._end()
 
     def _end(self) -> None:
-        if isinstance(self._window, PictureWindow):
+        if isinstance(self._window, PixelHistory):
             self._run(self._window.end())
 
     def _catch_up(self) -> None:
@@ -250,7 +250,7 @@ class LiveDnSS:
             self._begin(begin)
             return False
         self._taken = stop
-        if isinstance(self._window, PictureWindow):
+        if isinstance(self._window, PixelHistory):
             self._run(self._window.push_packed(packed))
         else:
             self._run(self._window.push(unpack_frames(packed, self.shape), wanted))
@@ -282,5 +282,5 @@ class LiveDnSS:
     def _await_pass(self, stop: int) -> None:
         """The next pass ends before frame `stop`."""
         self._next = stop
-        if isinstance(self._window, PictureWindow):
+        if isinstance(self._window, PixelHistory):
             self._window.step = self.step

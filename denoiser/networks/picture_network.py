@@ -5,7 +5,7 @@
     shares, own, carried' = out(z'), tanh(keep(z'))
     picture = sum shares x (rates, own^2) - DARK            [spikes/frame]; shares >= 0, sum 1: a softmax
 
-Planes are roots of rates + DARK (`picture_window`), where noise is about the same at any light, and so is the network's
+Planes are roots of rates + DARK (`pixel_history`), where noise is about the same at any light, and so is the network's
 own estimate.  Every rate plane has a share, so that a still scene can converge to its mean.
 """
 

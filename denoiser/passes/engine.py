@@ -15,14 +15,14 @@ from denoiser.ground.number_type import PRECISIONS, number_type
 from denoiser.passes import infer
 from denoiser.passes.given_network import check_network, has_passes
 from denoiser.passes.picture_pass import pictures_of
-from denoiser.passes.picture_window import (
+from denoiser.passes.pixel_history import (
     LOOKS,
     STEPS,
     TYPICAL_LOOK,
     TYPICAL_STEP,
     PictureInput,
     PictureLayout,
-    PictureWindow,
+    PixelHistory,
 )
 from denoiser.passes.pixel_map import PixelMap
 from denoiser.passes.recipe import AnyRecipe, PictureRecipe
@@ -35,7 +35,7 @@ from spikecam_env.types import Pictures
 
 ENGINES = ("torch", "captured")
 
-AnyWindow: TypeAlias = RollingWindow | PictureWindow
+AnyWindow: TypeAlias = RollingWindow | PixelHistory
 AnyInput: TypeAlias = PassWindow | PictureInput
 
 
@@ -108,7 +108,7 @@ class Engine:
         """The window of a stream of frames of `shape`, before its first frame."""
         layout = self.recipe.layout
         if isinstance(layout, PictureLayout):
-            return PictureWindow(layout, shape, self.unit, self.step, self.look)
+            return PixelHistory(layout, shape, self.unit, self.step, self.look)
         return RollingWindow(layout, shape, self.unit)
 
     def run(

@@ -20,7 +20,7 @@ from denoiser.ground.torch_threads import where_torch_can
 from denoiser.networks.picture_network import PictureDnSS
 from denoiser.passes.given_network import check_output, has_passes
 from denoiser.passes.infer import Carried, stacked
-from denoiser.passes.picture_window import PictureInput
+from denoiser.passes.pixel_history import PictureInput
 from spikecam_env.compiled import njit
 from spikecam_env.own_code import own_code
 from spikecam_env.types import Pictures

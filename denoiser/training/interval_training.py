@@ -18,7 +18,7 @@ from torch import Tensor, nn
 from denoiser.ground.number_type import computing_in
 from denoiser.passes.recipe import Recipe
 from denoiser.training.pairs import WARM_UP
-from denoiser.training.training_source import Guesses, SimulatedSource
+from denoiser.training.training_source import Guesses, StreamSource
 
 LOOK_AHEAD = 96
 """Frames after the middle one in which the clean interval's end is looked for; chosen here."""
@@ -45,10 +45,10 @@ class Taught(NamedTuple):
     """(N,) float32, 1 where the window counts."""
 
 
-class IntervalWindows(SimulatedSource):
+class IntervalWindows(StreamSource):
     """Simulated streams, cut to the windows of a network of one plane a pass; streams are taken in turn."""
 
-    options = SimulatedSource.options | {"refine": True}
+    options = StreamSource.options | {"refine": True}
     pool = POOL
 
     def __init__(self, recipe: Recipe, **streams: Any) -> None:

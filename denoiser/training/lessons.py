@@ -23,7 +23,7 @@ from denoiser.networks import ssml
 from denoiser.networks.reconstructor_recipe import ReconstructorRecipe
 from denoiser.networks.spk2imgnet import CENTRES, WINDOW
 from denoiser.training.simulated import UNIT_SHAPE, SimulatedStreams
-from denoiser.training.training_source import Guesses, HeldOut, SimulatedSource
+from denoiser.training.training_source import Guesses, HeldOut, StreamSource
 
 FLOOR = 0.05
 """Light below which errors weigh the same [spikes/frame]; chosen here (`denoiser.training.rollout.OFFSET` is 0.02)."""
@@ -70,13 +70,13 @@ class RollingWindows:
         return LessonWindows(self._spikes, self._light, self._age >= self._spikes.shape[1])
 
 
-class Lesson(SimulatedSource):
+class Lesson(StreamSource):
     """Simulated streams before a reconstructor, all of them in every step.
 
     Args:
         recipe: of the reconstructor.
         frames_a_step: by which the streams go on.
-        streams: as for `SimulatedSource`.
+        streams: as for `StreamSource`.
     """
 
     options: ClassVar = {"batch": 64, "validate_every": 500, "width": None, "frames_a_step": 12}

@@ -1,6 +1,6 @@
 """Training `picture` along simulated streams: the network meets its own past, as it will online.
 
-    collages (`scenes.flat.collage`) -> camera (`spikecam_env.sensor`) -> planes (`picture_window`) -> network
+    collages (`scenes.flat.collage`) -> camera (`spikecam_env.sensor`) -> planes (`pixel_history`) -> network
 
 Scenes move at up to 3 pixels a frame, stand still, stop, start and are panned; their light changes.  Each stream has a
 camera unit, a step and an age of its pictures of its own; a step of training takes some streams on by a few pictures:
@@ -25,14 +25,14 @@ from numpy.typing import NDArray
 from torch import Tensor, nn
 
 from denoiser.ground.number_type import computing_in, number_type
-from denoiser.passes.picture_window import (
+from denoiser.passes.pixel_history import (
     DARK,
     HISTORY,
     TYPICAL_LOOK,
     TYPICAL_STEP,
     PictureInput,
     PictureLayout,
-    PictureWindow,
+    PixelHistory,
 )
 from denoiser.passes.pixel_map import GAINS, PixelMap
 from denoiser.passes.recipe import PictureRecipe
@@ -150,13 +150,13 @@ def _even(rng: np.random.Generator, limits: tuple[float, float]) -> float:
 
 
 @dataclass
-class Played:
+class StreamPlayed:
     """A stream before the network, mid-way."""
 
     stream: SimulatedStream
     turn: Callable[[NDArray[Any]], NDArray[Any]]
     """Turns and mirrors frames (..., H, W)."""
-    window: PictureWindow
+    window: PixelHistory
     place: int = 0
     """Frames that were played."""
     hidden: Tensor | None = None
@@ -164,15 +164,15 @@ class Played:
     """(1, H, W) of the last picture."""
 
     @classmethod
-    def begin(cls, stream: SimulatedStream, rng: np.random.Generator | None, layout: PictureLayout) -> Played:
+    def begin(cls, stream: SimulatedStream, rng: np.random.Generator | None, layout: PictureLayout) -> StreamPlayed:
         """From the first frame; without a generator as it is, at the usual step and age."""
         shape = stream.gain.shape
         if rng is None:
-            return cls(stream, _turned(0, mirrored=False), PictureWindow(layout, shape))
+            return cls(stream, _turned(0, mirrored=False), PixelHistory(layout, shape))
         turn = _turned(int(rng.integers(4)), mirrored=bool(rng.integers(2)))
         look = TYPICAL_LOOK if rng.random() < 0.5 else int(rng.integers(LOOKS[0], LOOKS[1] + 1))
         unit = _measured(rng, turn(stream.gain), turn(stream.dark)) if rng.random() < MAPPED else None
-        return cls(stream, turn, PictureWindow(layout, shape, unit, round(_even(rng, STEPS)), look))
+        return cls(stream, turn, PixelHistory(layout, shape, unit, round(_even(rng, STEPS)), look))
 
     @property
     def is_over(self) -> bool:
@@ -255,8 +255,8 @@ class PictureLessons(TrainingSource):
         self._playing = [self._begun() for _ in range(SLOTS * taken)]
         self._taken, self._next, self._steps = taken, 0, 0
 
-    def _begun(self) -> Played:
-        return Played.begin(self._pool[int(self._rng.integers(len(self._pool)))], self._rng, self.layout)
+    def _begun(self) -> StreamPlayed:
+        return StreamPlayed.begin(self._pool[int(self._rng.integers(len(self._pool)))], self._rng, self.layout)
 
     def loss(self, network: nn.Module) -> Tensor:
         """Take some streams on by PASSES pictures; the mean loss of these, with gradients."""
@@ -288,7 +288,7 @@ class PictureLessons(TrainingSource):
         return torch.stack(total).sum() / PASSES
 
     def _pass(
-        self, network: nn.Module, playing: list[Played]
+        self, network: nn.Module, playing: list[StreamPlayed]
     ) -> tuple[Sequence[PictureInput], Tensor, Tensor, Tensor, tuple[Tensor, Tensor]]:
         """One pass of these streams.
 
@@ -328,7 +328,7 @@ class PictureLessons(TrainingSource):
         Returns:
             Of the network, of 1/ISI ("interval") and of a count of 40 frames ("mean"), as geometric means over streams.
         """
-        playing = [Played.begin(stream, None, self.layout) for stream in self._pool]
+        playing = [StreamPlayed.begin(stream, None, self.layout) for stream in self._pool]
         layout = self.layout
         guesses = {"interval": 1, "mean": len(layout.instants) + layout.counts.index(40)}
         logs: dict[str, list[float]] = {name: [] for name in ("network", *guesses)}

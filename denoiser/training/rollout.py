@@ -30,7 +30,7 @@ from denoiser.networks.stream_network import CARRY
 from denoiser.passes.recipe import Recipe
 from denoiser.passes.window import WindowLayout
 from denoiser.passes.window_torch import StreamWindows, learned, pushed
-from denoiser.training.training_source import Guesses, SimulatedSource
+from denoiser.training.training_source import Guesses, StreamSource
 
 OFFSET = 0.02
 """Rate below which errors weigh the same [spikes/frame]; chosen here."""
@@ -95,19 +95,19 @@ class _Past:
         return cls(*(torch.zeros((streams, count, side, side), device=device) for count, side in shapes))
 
 
-class Rollouts(SimulatedSource):
+class Rollouts(StreamSource):
     """Simulated streams before a network of many planes a pass, taken in turn.
 
     Args:
         recipe: of the network.
         teacher: a network of the same layout, whose rates are the target instead of the light.
-        streams: as for `SimulatedSource`.
+        streams: as for `StreamSource`.
 
     Raises:
         InputError: `StreamWindows` cannot begin the layout.
     """
 
-    options = SimulatedSource.options | {"channels": None, "teacher": None}
+    options = StreamSource.options | {"channels": None, "teacher": None}
     pool = POOL
     twins = ("noisy",)
 

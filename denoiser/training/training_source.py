@@ -41,7 +41,7 @@ class TrainingSource(ABC):
 
     @abstractmethod
     def __init__(self, recipe: Any, **streams: Any) -> None:
-        """With the arguments of `SimulatedSource`."""
+        """With the arguments of `StreamSource`."""
 
     @staticmethod
     def networks(recipe: Any) -> nn.Module:
@@ -63,7 +63,7 @@ Guesses: TypeAlias = tuple[Tensor, dict[str, tuple[Tensor, Tensor]]]
 """Light of N streams (N, planes, H, W); by name guesses of it, and the streams' weights (N,)."""
 
 
-class SimulatedSource(TrainingSource):
+class StreamSource(TrainingSource):
     """Simulated streams, taken in turn.
 
     Args:

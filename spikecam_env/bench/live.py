@@ -22,7 +22,7 @@ from denoiser.evaluate.metrics import psnr_db
 from denoiser.live import LiveDnSS
 from denoiser.live.session import Figures, Session, Shown
 from denoiser.online import OnlineDnSS
-from denoiser.passes.picture_window import STEPS
+from denoiser.passes.pixel_history import STEPS
 from scenes import RotatingDisk, Scene
 from scenes.catalogue import make_scene
 from spikecam_env.bench.machine import FRAME_RATE_HZ, SHAPE

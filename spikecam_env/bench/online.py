@@ -13,7 +13,7 @@ import torch
 from tqdm import tqdm
 
 from denoiser.online import OnlineDnSS
-from denoiser.passes.picture_window import TYPICAL_STEP
+from denoiser.passes.pixel_history import TYPICAL_STEP
 from denoiser.passes.recipe import recipe_of
 from scenes import RotatingDisk
 from spikecam_env.sensor import SpikeSensor

@@ -8,7 +8,7 @@ from typing import Annotated
 import tyro
 
 from spikecam_env.cli.evaluate_agents import Agents
-from spikecam_env.cli.evaluate_modes import Quick, SpikeZoo, Truth
+from spikecam_env.cli.evaluate_modes import Quick, SpikeZoo, TruthTests
 from spikecam_env.cli.evaluate_tables import StillScenes, Table1, Table2, Table3, Table4
 from spikecam_env.cli.evaluate_tasks import Tasks
 
@@ -31,7 +31,7 @@ class Evaluate:
         | Annotated[SpikeZoo, tyro.conf.subcommand("spikezoo", prefix_name=False)]
         | Annotated[Tasks, tyro.conf.subcommand("tasks", prefix_name=False)]
         | Annotated[Agents, tyro.conf.subcommand("agents", prefix_name=False)]
-        | Annotated[Truth, tyro.conf.subcommand("truth", prefix_name=False)]
+        | Annotated[TruthTests, tyro.conf.subcommand("truth", prefix_name=False)]
     ) = field(default_factory=Quick)
 
     def run(self) -> None:

@@ -65,7 +65,7 @@ class SpikeZoo:
 
 
 @dataclass
-class Truth:
+class TruthTests:
     """Compare with measured truth: a recording's other half, the fixed pattern of a moving one, measured cameras.
 
     Without recordings the simulated tests alone are run.  Options of reading a recording go into a side file beside

@@ -9,7 +9,7 @@ import torch
 from denoiser import OnlineDnSS
 from denoiser.many import ManyDnSS
 from denoiser.passes.picture_pass import pictures_of
-from denoiser.passes.picture_window import DARK, PictureLayout, PictureWindow
+from denoiser.passes.pixel_history import DARK, PictureLayout, PixelHistory
 from denoiser.passes.pixel_map import PixelMap
 from denoiser.passes.recipe import PictureRecipe
 from denoiser.weights import load_weights, save_weights
@@ -39,7 +39,7 @@ def rates_of(planes: np.ndarray) -> np.ndarray:
 
 
 def rates_of_a_pixel(spikes: np.ndarray, look: int) -> list[float]:
-    """The law of `picture_window` in words: of one pixel's spikes (T,), but for running means and the last picture."""
+    """The law of `pixel_history` in words: of one pixel's spikes (T,), but for running means and the last picture."""
     frames = len(spikes)
     ages = [frames - 1 - t for t in np.flatnonzero(spikes)][::-1]
     known = [age for age in ages if age < 128]
@@ -76,7 +76,7 @@ def rates_of_a_pixel(spikes: np.ndarray, look: int) -> list[float]:
 )
 def test_planes_are_those_of_the_law(frames: int, step: int, look: int) -> None:
     spikes = stream(frames)
-    *_, last = PictureWindow(LAYOUT, SHAPE, step=step, look=look).push(spikes)
+    *_, last = PixelHistory(LAYOUT, SHAPE, step=step, look=look).push(spikes)
     seen = frames // step * step
     look = min(look, seen - 1)
     wanted = np.array([[rates_of_a_pixel(spikes[:seen, y, x], look) for x in range(SHAPE[1])] for y in range(SHAPE[0])])
@@ -90,7 +90,7 @@ def test_planes_are_those_of_the_law(frames: int, step: int, look: int) -> None:
 def test_a_spike_older_than_the_history_is_remembered_by_its_age() -> None:
     spikes = np.zeros((1200, 4, 4), np.uint8)
     spikes[99] = 1
-    *_, last = PictureWindow(LAYOUT, (4, 4), step=400).push(spikes)
+    *_, last = PixelHistory(LAYOUT, (4, 4), step=400).push(spikes)
     rate = last.planes[0, 0, HISTORY] ** 2 - DARK
     assert rate == pytest.approx(1 / 1101, rel=1e-3), "an interval that has lasted 1101 frames"
 
@@ -99,7 +99,7 @@ def test_the_gain_is_that_of_spikes_to_pictures_and_is_taken_out() -> None:
     """Two pixels fire every 8 and every 10 frames where pictures say 0.1: gains of 1.25 and 1, of 2 spikes' prior."""
     spikes = np.zeros((800, 1, 4), np.uint8)
     spikes[::8, 0, 0] = spikes[::10, 0, 1:] = 1
-    window = PictureWindow(LAYOUT, (1, 4), step=40)
+    window = PixelHistory(LAYOUT, (1, 4), step=40)
     for given in window.push(spikes):
         window.learn(given, np.full((1, 1, 4), 0.1, np.float32))
         last = given
@@ -114,7 +114,7 @@ def test_the_gain_is_that_of_spikes_to_pictures_and_is_taken_out() -> None:
 def test_a_calibration_map_is_taken_out_instead() -> None:
     unit = PixelMap(np.array([[0.8, 1.2]], np.float32), np.array([[0.0, 0.01]], np.float32))
     spikes = stream(40, (1, 2), seed=3) | np.eye(40, dtype=np.uint8)[::5].sum(0)[:, None, None].astype(np.uint8)
-    plain, mapped = (next(PictureWindow(LAYOUT, (1, 2), u).push(spikes)).planes for u in (None, unit))
+    plain, mapped = (next(PixelHistory(LAYOUT, (1, 2), u).push(spikes)).planes for u in (None, unit))
     wanted = np.maximum(plain[0, :2, COUNT_40] ** 2 - DARK - unit.dark[0], 0) / unit.gain[0]
     assert mapped[0, :2, COUNT_40] ** 2 - DARK == pytest.approx(wanted, rel=1e-5)
     assert np.all(mapped[..., -1] == 1) and np.all(plain[..., -1] == 0)
@@ -122,7 +122,7 @@ def test_a_calibration_map_is_taken_out_instead() -> None:
 
 def test_the_compiled_pass_gives_the_networks_own_pictures() -> None:
     network = load_weights("picture")[1]
-    inputs = [list(PictureWindow(LAYOUT, (24, 20)).push(stream(80, (24, 20), seed)))[-1] for seed in (0, 1)]
+    inputs = [list(PixelHistory(LAYOUT, (24, 20)).push(stream(80, (24, 20), seed)))[-1] for seed in (0, 1)]
     both = pictures_of(network, inputs, [(), ()], (24, 20), torch.float32)
     for given, (picture, (hidden,)) in zip(inputs, both, strict=True):
         with torch.inference_mode():

@@ -24,7 +24,7 @@ ROUNDING = 1e-6
 """Of a picture: times that add up to one picture's give one picture."""
 
 
-class Film:
+class FilmEnd:
     """The end of a screen (`screen.window.End`) that keeps its pictures, each repeated for its time.
 
     H.264 stores one colour for 2 x 2 pixels, so the film has even sides: a picture with an odd side is repeated at its
@@ -69,7 +69,7 @@ class Film:
 
 
 @contextmanager
-def film(path: str | Path, fps: float, *, total: int | None = None, bar: bool = True) -> Iterator[Film]:
+def film(path: str | Path, fps: float, *, total: int | None = None, bar: bool = True) -> Iterator[FilmEnd]:
     """A film to show pictures in, an H.264 MP4; it appears whole at the end of the block.
 
     A warning states the film's size where that is not the pictures'.
@@ -89,7 +89,7 @@ def film(path: str | Path, fps: float, *, total: int | None = None, bar: bool = 
         tqdm(desc="film", unit="frame", total=total, leave=False, disable=not bar) as shown,
         av.open(beside, "w") as container,
     ):
-        made = Film(container.add_stream("libx264", rate=rate, options=options, pix_fmt="yuv420p"), fps, shown)
+        made = FilmEnd(container.add_stream("libx264", rate=rate, options=options, pix_fmt="yuv420p"), fps, shown)
         yield made
         container.mux(made.stream.encode(None))
     _warn_if_padded(made.shape)

@@ -17,7 +17,7 @@ SHORTEST_WAIT_S = 0.001
 
 
 class End(Protocol):
-    """Where the pictures of a screen go: a window, or a film (`screen.film.Film`)."""
+    """Where the pictures of a screen go: a window, or a film (`screen.film.FilmEnd`)."""
 
     closed: bool
     """Whether it takes no more."""

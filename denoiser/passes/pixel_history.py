@@ -124,7 +124,7 @@ class PictureInput:
     count = 1
 
 
-class PictureWindow:
+class PixelHistory:
     """The history of one stream, and its planes.
 
     Args:
