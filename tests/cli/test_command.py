@@ -69,7 +69,7 @@ def test_the_demo_makes_a_film_a_picture_and_its_figures(tmp_path: Path, capsys)
     printed = capsys.readouterr().out
     assert "clean twin" in printed and "x real time" in printed
     figures = json.loads((tmp_path / "demo.json").read_text())
-    assert [row["stream"] for row in figures["table"]] == ["noisy", "paper", "best", "clean twin"]
+    assert [row["stream"] for row in figures["table"]] == ["noisy", "paper", "best", "picture", "clean twin"]
     assert len(film_in(tmp_path / "demo.mp4")) == 500 // 25 - 6
     assert picture_in(tmp_path / "demo.png").shape[2] == 3
     assert f"wrote {tmp_path / 'demo.mp4'}" in printed

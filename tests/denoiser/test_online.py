@@ -162,7 +162,7 @@ def test_calls_out_of_order_say_what_comes_first():
 @pytest.mark.parametrize(
     "options",
     [
-        *({"output": "film"}, {"output": None}, {"precision": "int4"}, {"precision": None}, {"mode": None}),
+        *({"output": "film"}, {"output": 1}, {"precision": "int4"}, {"precision": None}, {"mode": None}),
         *({"mode": ["best"]}, {"stride": 0}, {"stride": 1.5}, {"stride": 2}, {"decoder": "film"}, {"overlap": 1}),
     ],
 )

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from gymnasium.utils.env_checker import check_env
 
+from denoiser.observation import Rate
 from spikecam_env.envs.observations import (
     ISI,
     OBSERVATIONS,
@@ -155,7 +156,7 @@ def test_the_frame_camera_sees_the_light_of_the_environment() -> None:
 
 
 def test_before_the_denoiser_has_a_picture_it_is_the_noisy_rate_and_marked() -> None:
-    env = gymnasium.make(DISK, **SMALL, obs="rate", obs_state=True)
+    env = gymnasium.make(DISK, **SMALL, obs=Rate("best"), obs_state=True)
     seen, info = env.reset(seed=1)
     noisy = gymnasium.make(DISK, **SMALL, obs="tfp").reset(seed=1)[0]
     np.testing.assert_array_equal(seen["picture"], noisy)
@@ -163,6 +164,15 @@ def test_before_the_denoiser_has_a_picture_it_is_the_noisy_rate_and_marked() -> 
     ages = [env.step(np.zeros(2, np.float32))[4]["age"] for _ in range(5)]
     print(ages)
     assert ages == [-1, -1, 16, 24, 16]
+
+
+def test_a_rate_is_by_default_a_picture_of_every_step() -> None:
+    env = gymnasium.make(DISK, shape=(16, 16), obs="rate", frames_per_step=40)
+    ages = [env.reset(seed=1)[1]["age"], *(env.step(np.zeros(2, np.float32))[4]["age"] for _ in range(3))]
+    assert ages == [12] * 4, "the frame 12 before the newest"
+    short = gymnasium.make(DISK, shape=(16, 16), obs="rate", frames_per_step=3)
+    ages = [short.reset(seed=1)[1]["age"], *(short.step(np.zeros(2, np.float32))[4]["age"] for _ in range(5))]
+    assert ages == [-1, -1, 8, 11, 14, 12], "nine frames are the shortest step of whole steps of three"
 
 
 def test_a_dim_rate_is_the_same_plane_ten_times_brighter() -> None:

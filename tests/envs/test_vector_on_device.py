@@ -13,6 +13,7 @@ import pytest
 import torch
 
 import spikecam_env.envs  # noqa: F401 - registers
+from denoiser.observation import Rate
 from spikecam_env.errors import InputError
 
 DEVICE = "cuda" if torch.cuda.is_available() else "cpu"
@@ -60,7 +61,7 @@ def test_all_is_as_on_the_processor(name: str, obs: str) -> None:
 
 def test_denoised_pictures_are_those_of_the_processor_to_a_grey_level() -> None:
     """The two denoisers differ by 1e-5, a grey level is 4e-3; in bfloat16 they differ by more than one."""
-    wanted = played(vector(DISK, None, obs="rate", max_episode_steps=7))
+    wanted = played(vector(DISK, None, obs=Rate("best"), max_episode_steps=7))
     found = played(vector(DISK, obs="rate", max_episode_steps=7))
     apart = [np.abs(a[0].cpu().numpy().astype(int) - b[0]) for a, b in zip(found, wanted, strict=True)]
     print(f"{np.mean(apart):.2g} grey levels on average, {np.max(apart)} at most")
