@@ -66,6 +66,7 @@ YOUTH = 256.0
 
 _Q = np.uint64
 _ALL = _Q(0xFFFFFFFFFFFFFFFF)
+_ONE = _Q(1)
 
 Words: TypeAlias = NDArray[np.uint64]
 """(2, pixels), of ages 0 .. 63 and 64 .. 127; bit a is age a."""
@@ -304,28 +305,26 @@ def _advance(
 ) -> None:
     """Take n <= 64 frames into the history; words (n, pixels / 64) hold the oldest first."""
     frames, pixels = words.shape[0], before.size
-    square = np.empty(64, np.uint64)
+    square, kept, rest = np.empty(64, np.uint64), _Q(frames - 1), _Q(64 - frames)
+    share = np.float32(1.0) / np.float32(frames)
     for column in range(words.shape[1]):
-        for age in range(64):
-            square[age] = words[frames - 1 - age, column] if age < frames else _Q(0)
+        for age in range(frames):
+            square[age] = words[frames - 1 - age, column]
+        square[frames:] = _Q(0)
         transpose(square)
         first = 64 * column
-        for p in range(first, min(first + 64, pixels)):
-            new, recent, old = square[p - first], bits[0, p], bits[1, p]
-            if frames == 64:
-                leaving, bits[1, p], bits[0, p] = old, recent, new
-            else:
-                n, rest = _Q(frames), _Q(64 - frames)
-                leaving = old >> rest
-                bits[1, p] = (old << n) | (recent >> rest)
-                bits[0, p] = (recent << n) | new
-            if leaving:
-                before[p] = 128 + np.int32(lowest(leaving))
-            else:
-                before[p] = min(before[p] + frames, OLDEST)
-            rate = np.float32(ones(new)) / np.float32(frames)
-            for m in range(shares.size):
-                means[m, p] += shares[m] * (rate - means[m, p])
+        count = min(64, pixels - first)
+        for i in range(count):  # no branch in it, so that the compiler does eight pixels at a time
+            recent, old = bits[0, first + i], bits[1, first + i]
+            leaving = old >> rest
+            bits[1, first + i] = ((old << kept) << _ONE) | (recent >> rest)
+            bits[0, first + i] = ((recent << kept) << _ONE) | square[i]
+            aged = min(before[first + i] + np.int32(frames), np.int32(OLDEST))
+            before[first + i] = np.int32(128) + np.int32(lowest(leaving)) if leaving else aged
+        for m in range(shares.size):
+            for i in range(count):
+                rate = np.float32(np.int64(ones(square[i]))) * share
+                means[m, first + i] += shares[m] * (rate - means[m, first + i])
 
 
 # The loops below are over a row of pixels, without branches, so that the compiler does eight pixels at a time.
