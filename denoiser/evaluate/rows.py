@@ -247,7 +247,8 @@ def _calibrated(case: StreamCase, exposed: ExposedStreams, path: Path) -> Planes
 
 
 def _pictured(case: StreamCase, exposed: ExposedStreams, path: Path, *, mapped: bool = False) -> Planes:
-    """As many streams as a step has frames, each a frame later: every frame is shown by one of them."""
+    """As many streams as a step has frames, each a frame later: every frame is shown by one of them.  The first frames
+    are shown by streams that end before a step is full."""
     planes = np.empty((exposed.stop - exposed.first, *exposed.noisy.shape[1:]), np.float32)
     like = OnlineDnSS.from_file(path, unit=calibrated(case) if mapped else None)
     step, late = like.engine.step, like.latency + 1
@@ -259,6 +260,10 @@ def _pictured(case: StreamCase, exposed: ExposedStreams, path: Path, *, mapped: 
             frame = begins % step + (number + 1) * step - late
             if exposed.first <= frame < exposed.stop:
                 planes[frame - exposed.first] = picture
+    for frame in range(exposed.first, min(step - late, exposed.stop)):
+        young = like.another()
+        young.push(exposed.noisy[: frame + late])
+        planes[frame - exposed.first] = np.asarray(young.flush())[0]
     return planes
 
 
