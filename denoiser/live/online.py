@@ -17,6 +17,7 @@ pictures have the bits of `OnlineDnSS`; `spikecam bench live` prints the cost of
 from __future__ import annotations
 
 import os
+import time
 from collections.abc import Iterable
 from dataclasses import replace
 from typing import Any, cast
@@ -71,6 +72,8 @@ class LiveDnSS:
     """Frames from one pass to the next."""
     latency: int
     """Frames between the frame that a picture shows and the newest it needs; up to `step` - 1 more have come."""
+    room: int
+    """Frames that are kept."""
     takes_every_frame: bool
     """Whether every frame is taken in and every pass is run, as in mode `picture`."""
     window: AnyInput | None
@@ -113,7 +116,7 @@ class LiveDnSS:
             self._reach = self.needed - (-(HISTORY + layout.past) // self.step) * self.step
         if checked_count(room, "room") < 2 * self._reach:
             raise InputError(f"room is {room}; it must be a whole number, {2 * self._reach} or more")
-        self._room = room
+        self.room = room
         self.reset()
 
     @property
@@ -130,7 +133,7 @@ class LiveDnSS:
     def free(self) -> int:
         """Frames that may come before `picture` or `take_in` is called, and none is lost."""
         waiting = self.count - self._taken if self.takes_every_frame else 0
-        return max(self._room - waiting, 0)
+        return max(self.room - waiting, 0)
 
     @property
     def frame(self) -> int | None:
@@ -139,7 +142,7 @@ class LiveDnSS:
 
     def reset(self) -> None:
         """Forget the stream."""
-        self.ring = Ring(self.shape, self._room)
+        self.ring = Ring(self.shape, self.room)
         """Where frames are kept; a reader of files or sockets writes to it directly (`lend`, `took`)."""
         self.lost = 0
         """Frames that were overwritten before mode `picture` took them in."""
@@ -156,13 +159,20 @@ class LiveDnSS:
             if not self._taken:
                 self._begin(0)
 
-    def warm_up(self) -> None:
-        """Do the slow work of the first pictures now, such as to compile; forgets the stream."""
+    def warm_up(self) -> float:
+        """Do the slow work of the first pictures now, such as to compile; forgets the stream.
+
+        Returns:
+            Time of a picture from a few frames [s].
+        """
         for frames in (self._reach, min(self.step, self._reach)):  # the second goes on from the first
             self.ring.push(np.zeros((frames, self.ring.rows.shape[1]), np.uint8))
+            began = time.perf_counter()
             self.end()
             self.picture()
+            picture_s = time.perf_counter() - began
         self.reset()
+        return picture_s
 
     def push(self, packed: NDArray[np.uint8]) -> None:
         """(T, ceil(H W / 8)) uint8 more frames, packed as by `pack_frames`; InputError for another array."""
@@ -244,7 +254,7 @@ class LiveDnSS:
         if not self.ring.holds(self._taken):
             self._end()
             origin, newest = self.ring.extent
-            begin = max(origin, newest - self._room // 2)
+            begin = max(origin, newest - self.room // 2)
             if self.takes_every_frame:
                 self.lost += begin - max(origin, self._taken)
             self._begin(begin)

@@ -35,6 +35,11 @@ LEAVE_S = 0.5
 """For which a reader, or a watcher of the last picture, is waited for at the end [s]; either may never come back."""
 BLOCK = 256
 """Frames that are read at a time, at most."""
+FOR_PICTURES = 0.5
+"""Share of the time for the network, at most; the rest takes frames in."""
+SLOWER = 0.9
+"""Pictures a second, over those before, where frames wait in half of the ring, and more than at the picture before:
+longer steps cost less a frame."""
 TICK_S = 0.002
 """After which a thread looks again whether there is work [s]; at 40 kHz 80 frames come meanwhile."""
 
@@ -138,9 +143,12 @@ class Session:
         self._start_s = self._ended_s = 0.0
         self._taken = self._lost = self._pictures = 0
         self._latency_s = 0.0
+        self._free = live.room  # frames for which the ring had room when the last picture was made
 
     def __enter__(self) -> Session:
-        self.live.warm_up()  # else frames would be lost meanwhile
+        picture_s = self.live.warm_up()  # else frames would be lost meanwhile
+        if self._source.waits and self.live.takes_every_frame:
+            self._pictures_s = min(self._pictures_s, FOR_PICTURES / picture_s)
         self.live.pace(self._frames_s, self._pictures_s)
         self._reader.start()
         self._denoiser.start()
@@ -226,8 +234,9 @@ class Session:
         self._arrivals.append((self.live.count, now))
 
     def _denoise(self) -> None:
-        due_s, period_s = 0.0, 1.0 / self._pictures_s
+        due_s = 0.0
         while not self._is_time_up():
+            period_s = 1.0 / self._pictures_s
             is_last = self._read_all.is_set()
             self.live.take_in()
             if is_last:
@@ -250,7 +259,11 @@ class Session:
             return
         noisy, frame = self.live.noisy(), self.live.frame
         assert frame is not None
-        if not self._source.waits and not self._pictures:
+        before, self._free = self._free, self.live.free
+        if self._source.waits and self._free < min(before, self.live.room // 2):
+            self._pictures_s *= SLOWER
+            self.live.pace(self._frames_s, self._pictures_s)
+        elif not self._source.waits and not self._pictures:
             self.live.pace(min(self._frames_s, self.figures.frames_per_s), self._pictures_s)
         latency_s = time.perf_counter() - self._came_at(frame)
         self._latency_s += latency_s

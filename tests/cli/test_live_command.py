@@ -82,7 +82,7 @@ def test_without_a_display_the_figures_of_a_file_are_printed(recording: Path, ca
     assert row["frames"] == 1200 and row["lost"] < 1200
     assert row["seconds"] >= 0.6 and row["x real time"] <= 0.051
     assert 1 <= row["pictures"] <= 30 * row["seconds"] + 2
-    assert row["latency [ms]"] >= 1e3 * 20 / 2000
+    assert row["latency [ms]"] >= 1e3 * 12 / 2000, "a picture is of the frame 12 before the newest"
 
 
 def test_a_film_is_what_a_window_would_show(recording: Path, capsys, tmp_path: Path) -> None:

@@ -76,7 +76,7 @@ def test_a_file_is_taken_in_at_its_pace_and_nothing_is_lost(live: LiveDnSS, monk
     figures = session.figures
     assert (figures.frames, figures.lost) == (1000, 0)
     assert figures.seconds >= 0.45
-    assert figures.pictures <= 20.0 * figures.seconds + 2
+    assert figures.pictures <= 20.0 * figures.seconds + 3  # the first, the last, and one that comes early
     frames = [shown.frame for shown in seen]
     assert frames == sorted(set(frames)) and frames[-1] == live.frame
     assert live.count == 1000 and 1000 - live.frame <= live.latency + live.step
