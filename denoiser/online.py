@@ -332,12 +332,12 @@ def denoise(spikes: ArrayLike, mode: str = "best", *, chunk: int = 256, **option
 
     Args:
         spikes: (T, H, W) recorded.
-        mode: "best", "fast" or "paper".
+        mode: "best", "fast", "paper" or "picture".
         chunk: frames that are pushed at a time, to save memory.
         options: as for `OnlineDnSS`.
 
     Returns:
-        T denoised frames.
+        T denoised frames; of mode "picture" one for each step, and a last one for the frames that fill none.
 
     Raises:
         InputError: as `OnlineDnSS`; and for a chunk that is no whole number, 1 or more.

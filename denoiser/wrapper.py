@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from denoiser.online import OnlineDnSS
 from denoiser.passes.recipe import RECIPES
 from spikecam_env.envs.observations import block_shape
-from spikecam_env.errors import NotReadyError, unknown_name
+from spikecam_env.errors import InputError, NotReadyError, unknown_name
 
 OUTPUTS = ("spikes", "rate")
 WARM_UPS = ("black", "noisy")
@@ -120,7 +120,14 @@ class DenoiseObservation(gymnasium.Wrapper, gymnasium.utils.RecordConstructorArg
 
 
 def _denoiser(mode: Any, output: str) -> OnlineDnSS:
-    """One of the wrapper's own."""
+    """One of the wrapper's own; InputError for one that gives no frames."""
+    made = None if mode == "picture" else _made(mode, output)
+    if made is None or made.engine.recipe.decoder is None:
+        raise InputError("mode 'picture' gives one picture a step, and no block of frames; use obs='rate' instead")
+    return made
+
+
+def _made(mode: Any, output: str) -> OnlineDnSS:
     if isinstance(mode, OnlineDnSS):
         return mode.another(output)
     if isinstance(mode, str) and mode in RECIPES:

@@ -6,13 +6,14 @@ import numpy as np
 import pytest
 import torch
 
-from denoiser import OnlineDnSS
+from denoiser import DenoiseObservation, OnlineDnSS
 from denoiser.many import ManyDnSS
 from denoiser.passes.picture_pass import pictures_of
 from denoiser.passes.pixel_history import DARK, PictureLayout, PixelHistory
 from denoiser.passes.pixel_map import PixelMap
 from denoiser.passes.recipe import PictureRecipe
-from denoiser.weights import load_weights, save_weights
+from denoiser.weights import load_weights, pretrained_path, save_weights
+from spikecam_env.envs.rotating_disk import RotatingDiskEnv
 from spikecam_env.errors import InputError, NotReadyError
 from spikecam_env.streams.packing import pack_frames
 
@@ -203,6 +204,13 @@ def test_weights_are_written_and_read_with_their_recipe(tmp_path) -> None:
 def test_options_of_other_modes_are_refused(options: dict, message: str) -> None:
     with pytest.raises(InputError, match=message):
         online(**options)
+
+
+@pytest.mark.parametrize("given", ["name", "file", "denoiser"])
+def test_the_wrapper_of_blocks_of_frames_refuses_it_and_says_what_to_use(given: str) -> None:
+    mode = {"name": "picture", "file": str(pretrained_path("picture")), "denoiser": online()}[given]
+    with pytest.raises(InputError, match="no block of frames; use obs='rate'"):
+        DenoiseObservation(RotatingDiskEnv(shape=(16, 24)), mode, "rate")
 
 
 def test_other_modes_refuse_its_options() -> None:
