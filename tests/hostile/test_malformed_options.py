@@ -235,7 +235,7 @@ COMMAND_LINES: dict[str, tuple[tuple[Any, ...], dict[str, tuple[Any, ...]]]] = {
         ("live", "{here}/a.dat", "--height", 8, "--width", 8, "--film", "{out}.mp4"),
         {
             "--film": ("{here}/x.avi", "{here}/x", "{here}/none/x.mp4"),
-            "--frames": (*COUNTS, 31),
+            "--frames": COUNTS,
             "--seconds": FLOATS,
             "--speed": (*FLOATS, *ENDS),
             "--pictures": (*FLOATS, "1e4"),
