@@ -124,7 +124,7 @@ def test_who_imitates_plays_without_noise_and_comes_to_act_like_the_oracle(tmp_p
     train_agent(Study("Catch-v1", options={"shape": (16, 16)}), tmp_path, imitating, environments=4)
     first, last = np.mean(misses[:2]), np.mean(misses[-4:])
     print(f"mean square from the oracle's action: {first:.2f} at first, {last:.2f} at last")
-    assert last < first / 2
+    assert last < 0.7 * first  # of rollouts of 128 actions: the ratio is 0.5, and scatters by 0.06
     policy = Agent.load(tmp_path / "agent.pt").policy
     assert policy.log_sigma.tolist() == [LOG_SIGMA]  # noise is not played, and not learned
 
