@@ -51,14 +51,14 @@ class PictureDnSS(nn.Module):
         self.out = nn.Conv2d(fine, 4 * (rates + 2), 1)
         self.keep = nn.Conv2d(fine, HIDDEN, 1)
 
-    def forward(self, planes: Tensor, conditions: Tensor, hidden: Tensor | None = None) -> tuple[Tensor, Tensor]:
+    def forward(self, planes: Tensor, conditions: Tensor, hidden: Tensor | None = None) -> tuple[Tensor, tuple[Tensor]]:
         out, kept = self.passed(planes, conditions, hidden)
         height, width = planes.shape[-2:]
         # channels are those of the four pixels of a square, one after another
         squares = out.float().unflatten(1, (2, 2, self.rates + 2)).permute(0, 3, 4, 1, 5, 2)
         full = squares.reshape(len(out), self.rates + 2, height, width)
         roots = torch.cat([planes[:, : self.rates], full[:, -1:]], dim=1)
-        return (full[:, :-1].softmax(dim=1) * roots.square()).sum(dim=1, keepdim=True) - self.dark, kept
+        return (full[:, :-1].softmax(dim=1) * roots.square()).sum(dim=1, keepdim=True) - self.dark, (kept,)
 
     def passed(self, planes: Tensor, conditions: Tensor, hidden: Tensor | None) -> tuple[Tensor, Tensor]:
         """Logits of the shares, and the own root, (N, 4 (rates + 2), H/2, W/2), and the next hidden picture."""

@@ -23,7 +23,7 @@ for where nothing moves, texture is taken for gain.  The gain is g = (spikes + 2
 `denoiser.passes.window`; a picture stands for the frames of its step, but for no more than the history holds.  With a
 calibration map, planes are (plane - dark) / gain, and c is 1.
 
-A frame costs some nanoseconds a pixel, whatever the step: its bits go into the history, and what leaves it goes into
+The cost of a frame does not depend on the step: its bits go into the history, and what leaves it goes into
 one number, the age of the last spike before it.  The stream is cut by steps alone, however it is pushed.
 """
 

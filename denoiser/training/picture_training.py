@@ -306,7 +306,7 @@ class PictureLessons(TrainingSource):
         if some is not None:
             hidden = torch.stack([torch.zeros_like(some) if p.hidden is None else p.hidden for p in playing])
         with computing_in(self._type, device):
-            picture, kept = network(planes, conditions, hidden)
+            picture, (kept,) = network(planes, conditions, hidden)
         known = torch.tensor([float(p.window.seen >= LEAST_SEEN) for p in playing], device=device)
         nothing = torch.zeros_like(light[0])
         before = torch.stack([nothing if p.error is None else p.error for p in playing])

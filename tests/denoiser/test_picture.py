@@ -127,11 +127,26 @@ def test_the_compiled_pass_gives_the_networks_own_pictures() -> None:
     both = pictures_of(network, inputs, [(), ()], (24, 20), torch.float32)
     for given, (picture, (hidden,)) in zip(inputs, both, strict=True):
         with torch.inference_mode():
-            rate, kept = network(
+            rate, (kept,) = network(
                 torch.from_numpy(given.planes[None]).permute(0, 3, 1, 2), torch.from_numpy(given.conditions[None])
             )
         np.testing.assert_allclose(picture, rate[0].clamp(0, 1), atol=1e-5)
         np.testing.assert_allclose(hidden, kept[0], atol=1e-5)
+
+
+def test_a_module_around_the_network_is_called_and_gives_the_same_pictures() -> None:
+    class Around(torch.nn.Module):
+        def __init__(self, inner: torch.nn.Module) -> None:
+            super().__init__()
+            self.inner = inner
+
+        def forward(self, *given):
+            return self.inner(*given)
+
+    recipe, network, _ = load_weights("picture")
+    spikes = stream(120)
+    found = OnlineDnSS(recipe, Around(network), precision="float32").push(spikes)
+    np.testing.assert_allclose(found, online().push(spikes), atol=1e-5)
 
 
 @pytest.mark.parametrize("step", [8, 40, 100])
