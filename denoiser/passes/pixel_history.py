@@ -40,7 +40,7 @@ from denoiser.ground.strips import share_rows
 from denoiser.passes.pixel_map import PixelMap
 from denoiser.passes.window import WINDOW_PRIOR, check_like
 from spikecam_env.compiled import njit
-from spikecam_env.streams.bits import as_words, highest, lowest, ones, transpose
+from spikecam_env.streams.bits import as_words, by_pixel, highest, lowest, ones
 from spikecam_env.streams.packing import pack_frames
 from spikecam_env.types import Pictures
 
@@ -235,7 +235,7 @@ class PixelHistory:
         """Take the first held frames into the history."""
         if not frames:
             return
-        words = as_words(self._held[:frames])
+        words = as_words(self._held[:frames][::-1])
         shares = np.asarray([1 - (1 - 1 / m) ** frames for m in self.layout.memories], np.float32)
 
         def advanced(pixels: slice) -> None:
@@ -260,12 +260,11 @@ class PixelHistory:
         weights = np.asarray([1 / (1 - (1 - 1 / m) ** self.seen) for m in layout.memories], np.float32)[:, None]
         nothing = np.zeros(0, np.float32)
         gain, dark = (nothing, nothing) if self.unit is None else (self.unit.gain.ravel(), self.unit.dark.ravel())
-
         means = self._means * weights
 
         def painted(_: int, rows: slice) -> None:
             of_rows = slice(width * rows.start, width * rows.stop)
-            _paint_rows(
+            _paint(
                 self._bits[:, of_rows], self._before[of_rows], self.seen, look, instants, counts, widths,
                 means[:, of_rows], self._last[of_rows], self._sums[:, of_rows], self._changed[of_rows],
                 gain[of_rows], dark[of_rows], planes[rows],
@@ -305,27 +304,24 @@ def _advance(
     shares: NDArray[np.float32],
     means: NDArray[np.float32],
 ) -> None:
-    """Take n <= 64 frames into the history; words (n, pixels / 64) hold the oldest first."""
+    """Take n <= 64 frames into the history; words (n, pixels / 64) hold the newest first."""
     frames, pixels = words.shape[0], before.size
-    square, kept, rest = np.empty(64, np.uint64), _Q(frames - 1), _Q(64 - frames)
+    new, kept, rest = np.empty((64, 1), np.uint64), _Q(frames - 1), _Q(64 - frames)
     share = np.float32(1.0) / np.float32(frames)
     for column in range(words.shape[1]):
-        for age in range(frames):
-            square[age] = words[frames - 1 - age, column]
-        square[frames:] = _Q(0)
-        transpose(square)
+        by_pixel(words, column, new)
         first = 64 * column
         count = min(64, pixels - first)
         for i in range(count):  # no branch in it, so that the compiler does eight pixels at a time
             recent, old = bits[0, first + i], bits[1, first + i]
             leaving = old >> rest
             bits[1, first + i] = ((old << kept) << _ONE) | (recent >> rest)
-            bits[0, first + i] = ((recent << kept) << _ONE) | square[i]
+            bits[0, first + i] = ((recent << kept) << _ONE) | new[i, 0]
             aged = min(before[first + i] + np.int32(frames), np.int32(OLDEST))
             before[first + i] = np.int32(128) + np.int32(lowest(leaving)) if leaving else aged
         for m in range(shares.size):
             for i in range(count):
-                rate = np.float32(np.int64(ones(square[i]))) * share
+                rate = np.float32(np.int64(ones(new[i, 0]))) * share
                 means[m, first + i] += shares[m] * (rate - means[m, first + i])
 
 
@@ -389,36 +385,8 @@ def _count_between(bits: Words, first: Counts, stop: Counts, out: Counts) -> Non
 
 
 @njit(cache=True, nogil=True, boundscheck=False, error_model="numpy")
-def _paint_rows(
-    bits: Words,
-    before: NDArray[np.int32],
-    seen: int,
-    look: int,
-    instants: Counts,
-    counts: Counts,
-    widths: Counts,
-    means: NDArray[np.float32],
-    last: NDArray[np.float32],
-    sums: NDArray[np.float32],
-    changed: NDArray[np.float32],
-    mapped_gain: NDArray[np.float32],
-    mapped_dark: NDArray[np.float32],
-    planes: NDArray[np.float32],
-) -> None:
-    """The planes (rows, columns, layers) of some rows, whose border is not painted."""
-    width = before.size // len(planes)
-    for row in range(len(planes)):
-        begin, stop = width * row, width * (row + 1)
-        _paint(
-            bits[:, begin:stop], before[begin:stop], seen, look, instants, counts, widths, means[:, begin:stop],
-            last[begin:stop], sums[:, begin:stop], changed[begin:stop], mapped_gain[begin:stop],
-            mapped_dark[begin:stop], planes[row, :width],
-        )  # fmt: skip
-
-
-@njit(cache=True, nogil=True, boundscheck=False, error_model="numpy")
 def _paint(
-    bits: Words,
+    all_bits: Words,
     last_before: NDArray[np.int32],
     seen: int,
     look: int,
@@ -433,43 +401,48 @@ def _paint(
     mapped_dark: NDArray[np.float32],
     planes: NDArray[np.float32],
 ) -> None:
-    """The planes (pixels, layers) of a row of pixels."""
-    width = last_before.size
-    before = last_before.astype(np.int64)
+    """The planes (rows, columns, layers) of some rows, whose border is not painted."""
+    width = last_before.size // len(planes)
     newest, still_open, older, younger = np.empty((4, width), np.int64)
     rates = instants.size + counts.size + widths.size + 1
     spikes, frames = np.ones((rates, width), np.int64), np.empty((rates, width), np.int64)
-    _find_older(bits, before, 0, newest)
-    _measure_open(bits, before, newest, still_open)
-    at = 0
-    for i in range(instants.size):
-        age = min(instants[i], seen)
-        _find_older(bits, before, age, older)
-        _find_younger(bits, age, younger)
-        for x in range(width):
-            frames[at, x] = older[x] - younger[x] if younger[x] >= 0 else still_open[x]
-        at += 1
-    for i in range(counts.size):
-        first = max(look - counts[i] // 2, 0)
-        stop = min(first + counts[i], max(seen, first + 1))
-        _count(bits, first, stop, spikes[at])
-        frames[at] = stop - first
-        at += 1
-    for i in range(widths.size + 1):
-        if i < widths.size:
-            _find_older(bits, before, min(look + widths[i], seen), older)
-            _find_younger(bits, max(look - widths[i], 0) + 1, younger)
+    for row in range(len(planes)):
+        mine = slice(width * row, width * (row + 1))
+        bits, before = all_bits[:, mine], last_before[mine].astype(np.int64)
+        _find_older(bits, before, 0, newest)
+        _measure_open(bits, before, newest, still_open)
+        at = 0
+        for i in range(instants.size):
+            age = min(instants[i], seen)
+            _find_older(bits, before, age, older)
+            _find_younger(bits, age, younger)
             for x in range(width):
-                younger[x] = younger[x] if younger[x] >= 0 else newest[x]
-        else:
-            older[:], younger[:] = before, newest
-        _count_between(bits, younger, older, spikes[at])
-        for x in range(width):
-            whole = older[x] > younger[x]
-            frames[at, x] = older[x] - younger[x] if whole else still_open[x]
-            spikes[at, x] = spikes[at, x] if whole else 1
-        at += 1
-    _correct(spikes, frames, means, last, sums, changed, mapped_gain, mapped_dark, planes)
+                frames[at, x] = older[x] - younger[x] if younger[x] >= 0 else still_open[x]
+            at += 1
+        for i in range(counts.size):
+            first = max(look - counts[i] // 2, 0)
+            stop = min(first + counts[i], max(seen, first + 1))
+            _count(bits, first, stop, spikes[at])
+            frames[at] = stop - first
+            at += 1
+        for i in range(widths.size + 1):
+            if i < widths.size:
+                _find_older(bits, before, min(look + widths[i], seen), older)
+                _find_younger(bits, max(look - widths[i], 0) + 1, younger)
+                for x in range(width):
+                    younger[x] = younger[x] if younger[x] >= 0 else newest[x]
+            else:
+                older[:], younger[:] = before, newest
+            _count_between(bits, younger, older, spikes[at])
+            for x in range(width):
+                whole = older[x] > younger[x]
+                frames[at, x] = older[x] - younger[x] if whole else still_open[x]
+                spikes[at, x] = spikes[at, x] if whole else 1
+            at += 1
+        _correct(
+            spikes, frames, means[:, mine], last[mine], sums[:, mine], changed[mine], mapped_gain[mine],
+            mapped_dark[mine], planes[row],
+        )  # fmt: skip
 
 
 @njit(cache=True, nogil=True, boundscheck=False, error_model="numpy")
