@@ -11,6 +11,7 @@ Before the first plane is finished agents see the noisy rate of all frames so fa
 from __future__ import annotations
 
 import os
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from functools import lru_cache
 from typing import Any
@@ -142,16 +143,16 @@ def _step(frames_per_step: int) -> int:
     return min(frames_per_step * -(-least // frames_per_step), most)
 
 
-def _denoiser(mode: str | os.PathLike[str], **options: Any) -> OnlineDnSS:
+def _denoiser(mode: str | os.PathLike[str], *, step: int | None = None, device: str | None = None) -> OnlineDnSS:
     """Of a mode that is shipped, read once a process: an episode begins in the time of a step."""
-    if isinstance(mode, str) and mode in MODES:
-        return _shipped(mode, **options if mode == "picture" or "device" in options else {})
+    return (_shipped if isinstance(mode, str) and mode in MODES else _read)(mode, step, device)
+
+
+def _read(mode: str | os.PathLike[str], step: int | None, device: str | None) -> OnlineDnSS:
+    """A denoiser of rates; the step is of networks of one picture a step alone."""
     recipe, network, _ = load_weights(mode)
-    if not isinstance(recipe, PictureRecipe):
-        options.pop("step", None)
-    return OnlineDnSS(recipe, network, output="rate", **options)
+    step = step if isinstance(recipe, PictureRecipe) else None
+    return OnlineDnSS(recipe, network, output="rate", step=step, device=device)
 
 
-@lru_cache(maxsize=4 * len(MODES))
-def _shipped(mode: str, **options: Any) -> OnlineDnSS:
-    return OnlineDnSS.pretrained(mode, output="rate", **options)
+_shipped: Callable[..., OnlineDnSS] = lru_cache(maxsize=4 * len(MODES))(_read)

@@ -24,7 +24,7 @@ from torch import Tensor, nn
 from denoiser.ground.plain_torch import read_plain, tensors_like
 from denoiser.ground.torch_threads import where_torch_can
 from denoiser.networks.reconstructor_recipe import LEARNED, ReconstructorRecipe
-from denoiser.passes.recipe import MODES, PictureRecipe, Recipe, recipe_from
+from denoiser.passes.recipe import MODES, recipe_from
 from denoiser.passes.recipe import AnyRecipe as DenoiserRecipe
 from spikecam_env.errors import InputError, shown, unknown_name
 from spikecam_env.whole import whole_file
@@ -41,9 +41,8 @@ def save_weights(
 ) -> None:
     """Write a checkpoint of a denoiser or a reconstructor; the file appears whole."""
     state = {name: tensor.detach().cpu().contiguous() for name, tensor in network.state_dict().items()}
-    if isinstance(recipe, Recipe | PictureRecipe):
-        names = {"format": FORMAT, "mode": mode}
-    else:
+    names = {"format": FORMAT, "mode": mode}
+    if isinstance(recipe, ReconstructorRecipe):
         names = {"format": RECONSTRUCTOR_FORMAT, "name": mode}
         state = {name: tensor.to(torch.float16) for name, tensor in state.items()}
     data = {**names, "recipe": recipe.to_dict(), "state_dict": state, "training": training}

@@ -28,12 +28,17 @@ def draw_model(rng: np.random.Generator) -> SensorModel:
     model = replace(SensorModel.preset(preset), frame_rate_hz=40_000.0 if rng.random() < 0.7 else 20_000.0)
     if rng.random() < 0.5:
         return model
-    strength = {name: float(np.exp(rng.uniform(np.log(low), np.log(high)))) for name, low, high in VARIED}
+    strength = {name: drawn_evenly(rng, low, high) for name, low, high in VARIED}
     for effect in model.effects:
         if effect.name in strength:
             varied = {field: value * strength[effect.name] for field, value in effect.parameters().items()}
             model = model.with_effect(replace(effect, **varied))
     return model
+
+
+def drawn_evenly(rng: np.random.Generator, low: float, high: float) -> float:
+    """A number from low to high, even in its logarithm."""
+    return float(np.exp(rng.uniform(np.log(low), np.log(high))))
 
 
 def light_in_frame(light: Keyframes, frame: int) -> NDArray[np.float32]:

@@ -36,7 +36,7 @@ from denoiser.passes.pixel_history import (
 )
 from denoiser.passes.pixel_map import GAINS, PixelMap
 from denoiser.passes.recipe import PictureRecipe
-from denoiser.training.pairs import draw_model
+from denoiser.training.pairs import draw_model, drawn_evenly, light_in_frame
 from denoiser.training.rollout import MAP_ERRORS, OFFSET, STEADY
 from denoiser.training.simulated import Bank
 from denoiser.training.training_source import HeldOut, TrainingSource
@@ -104,16 +104,16 @@ class SimulatedStream:
 
     def light_at(self, frame: int) -> Pictures:
         """(H, W) mean light of a frame, in [0, 1] [spikes/frame]."""
-        return np.clip(self.light.at(frame + 0.5), 0.0, 1.0)
+        return light_in_frame(self.light, frame)
 
 
 def simulated_stream(rng: np.random.Generator, size: int, textures: list[Texture]) -> SimulatedStream:
     """A stream of size x size pixels, drawn anew."""
-    speed = 0.0 if rng.random() < STILL else _even(rng, SPEEDS)
-    pan = _even(rng, PANS) if speed and rng.random() < PANNED else 0.0
-    light = _even(rng, DIM_LIGHT if rng.random() < DIM else LIGHT)
+    speed = 0.0 if rng.random() < STILL else drawn_evenly(rng, *SPEEDS)
+    pan = drawn_evenly(rng, *PANS) if speed and rng.random() < PANNED else 0.0
+    light = drawn_evenly(rng, *(DIM_LIGHT if rng.random() < DIM else LIGHT))
     scene = Collage(
-        (size, size), int(rng.integers(2**31)), speed=speed, light=light, contrast=_even(rng, CONTRAST),
+        (size, size), int(rng.integers(2**31)), speed=speed, light=light, contrast=drawn_evenly(rng, *CONTRAST),
         textures=textures,
     )  # fmt: skip
     every = max(1, min(32, int(MOTION_A_KEY / max(speed + pan, 1e-3))))
@@ -144,11 +144,6 @@ def _course(rng: np.random.Generator, frames: Floats) -> tuple[Floats, Floats]:
     return times[at], levels[np.searchsorted(ends, at, side="right")].astype(np.float32)
 
 
-def _even(rng: np.random.Generator, limits: tuple[float, float]) -> float:
-    """Between these limits, even in its logarithm."""
-    return float(np.exp(rng.uniform(*np.log(limits))))
-
-
 @dataclass
 class StreamPlayed:
     """A stream before the network, mid-way."""
@@ -172,7 +167,7 @@ class StreamPlayed:
         turn = _turned(int(rng.integers(4)), mirrored=bool(rng.integers(2)))
         look = TYPICAL_LOOK if rng.random() < 0.5 else int(rng.integers(LOOKS[0], LOOKS[1] + 1))
         unit = _measured(rng, turn(stream.gain), turn(stream.dark)) if rng.random() < MAPPED else None
-        return cls(stream, turn, PixelHistory(layout, shape, unit, round(_even(rng, STEPS)), look))
+        return cls(stream, turn, PixelHistory(layout, shape, unit, round(drawn_evenly(rng, *STEPS)), look))
 
     @property
     def is_over(self) -> bool:
@@ -181,7 +176,7 @@ class StreamPlayed:
     def vary(self, rng: np.random.Generator) -> None:
         """Now and then, take steps of another length."""
         if rng.random() < VARIED_STEPS:
-            self.window.step = round(_even(rng, STEPS))
+            self.window.step = round(drawn_evenly(rng, *STEPS))
 
     def next(self) -> tuple[PictureInput, Pictures]:
         """The next pass, and the light that it is to show (1, H, W)."""
@@ -202,7 +197,7 @@ def _turned(quarters: int, *, mirrored: bool) -> Callable[[NDArray[Any]], NDArra
 
 def _measured(rng: np.random.Generator, gain: Pictures, dark: Pictures) -> PixelMap:
     """A calibration map of a unit, with a calibration's errors."""
-    size = _even(rng, MAP_ERRORS)
+    size = drawn_evenly(rng, *MAP_ERRORS)
     measured = gain * (1 + size * rng.standard_normal(gain.shape))
     below = dark + size * dark.mean() * rng.standard_normal(dark.shape)
     return PixelMap(np.clip(measured / measured.mean(), *GAINS), np.clip(below, 0.0, 1.0))
