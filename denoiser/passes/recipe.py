@@ -164,9 +164,8 @@ def recipe_of(mode: str) -> Recipe:
     return RECIPES[mode]
 
 
-def checked_channels(channels: Sequence[int]) -> tuple[int, int, int]:
-    """Channels of a network of many planes; InputError unless they are three whole numbers in range."""
-    if isinstance(channels, str) or not isinstance(channels, Sequence) or len(channels) != 3:
-        raise InputError(f"channels is {shown(channels)}; it must be three numbers, as (64, 128, 24)")
-    half, quarter, head = (checked_whole(count, "channels", 1, MOST_CHANNELS) for count in channels)
-    return half, quarter, head
+def checked_channels(channels: Any, like: Sequence[int]) -> tuple[int, ...]:
+    """Channels of a network, as many numbers as `like` has; InputError unless they are whole numbers in range."""
+    if isinstance(channels, str) or not isinstance(channels, Sequence) or len(channels) != len(like):
+        raise InputError(f"channels is {shown(channels)}; it must be {len(like)} numbers, as {tuple(like)}")
+    return tuple(checked_whole(count, "channels", 1, MOST_CHANNELS) for count in channels)

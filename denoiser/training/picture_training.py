@@ -224,7 +224,7 @@ class PictureLessons(TrainingSource):
         bank: of which the textures are used.
     """
 
-    options: ClassVar[dict[str, Any]] = {"batch": 8, "validate_every": 1000, "start": None}
+    options: ClassVar[dict[str, Any]] = {"batch": 8, "validate_every": 1000, "start": None, "channels": None}
     held_out: ClassVar[HeldOut] = HeldOut(streams=1, patch=80, passes=HISTORY)
 
     def __init__(

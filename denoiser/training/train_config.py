@@ -11,7 +11,7 @@ from typing import Annotated, Any, get_type_hints
 from denoiser.ground.captured import checked_compiler
 from denoiser.networks.reconstructor_recipe import LEARNED, reconstructor_recipe
 from denoiser.networks.spk2imgnet import WINDOW
-from denoiser.passes.recipe import MODES, Recipe, checked_channels
+from denoiser.passes.recipe import MODES, PictureRecipe, checked_channels
 from denoiser.training.interval_training import IntervalWindows
 from denoiser.training.lessons import SelfTaught, Supervised
 from denoiser.training.picture_training import PictureLessons
@@ -76,9 +76,9 @@ class TrainConfig:
     """The simulated light by `torch.compile`, on a processor too; a GPU always does."""
     refine: Annotated[bool, _flag] = True
     """`paper` with its refine module or, for the ablation, without."""
-    channels: Annotated[tuple[int, int, int] | None, _channels] = None
-    """Of `best` and `fast`, as `stream_network.StreamDnSS` has them: fewer are faster, and less accurate.  None: the
-    mode's."""
+    channels: tuple[int, ...] | None = None
+    """Of `best` and `fast`, as `stream_network.StreamDnSS` has them, of `picture`, as `picture_network.PictureDnSS`:
+    fewer are faster, and less accurate.  None: the mode's."""
     validate_passes: Annotated[int, WholeRange(1, 10**6).check] = OF_MODE
     """Passes of each validation of a denoiser along its streams: 24."""
     start: Annotated[str | None, _weights] = None
@@ -104,6 +104,8 @@ class TrainConfig:
                 for check in getattr(hints[name], "__metadata__", ()):
                     value = check(value, name)
             object.__setattr__(self, name, value)
+        if self.channels is not None:
+            object.__setattr__(self, "channels", self.recipe.channels)  # type: ignore[union-attr]
         if WholeRange(source.sides[0], source.sides[-1]).check(self.patch, "patch") not in source.sides:
             raise InputError(f"patch is {self.patch}; it must be a multiple of {source.sides.step}")
         checked_device(self.device, "train with --device cpu")
@@ -116,9 +118,12 @@ class TrainConfig:
         if self.mode in LEARNED:
             return reconstructor_recipe(self.mode, self.width)
         recipe = MODES[self.mode]
-        if not isinstance(recipe, Recipe):
-            return recipe
-        return replace(recipe, refine=self.refine, channels=recipe.channels if self.channels is None else self.channels)
+        channels: Any = recipe.channels
+        if self.channels is not None:
+            channels = checked_channels(self.channels, recipe.channels)
+        if isinstance(recipe, PictureRecipe):
+            return replace(recipe, channels=channels)
+        return replace(recipe, refine=self.refine, channels=channels)
 
     @property
     def source(self) -> type[TrainingSource]:
@@ -146,10 +151,6 @@ def _weights(value: Any, name: str) -> str:
 
 def _width(value: Any, _: str) -> int:
     return reconstructor_recipe("ssml", value).width
-
-
-def _channels(value: Any, _: str) -> tuple[int, int, int]:
-    return checked_channels(value)
 
 
 OF_SOME = {name for source in SOURCES.values() for name in source.options}

@@ -41,9 +41,9 @@ class Train:
     """Device of streams and network: cpu, cuda, cuda:1."""
     refine: bool = True
     """Give `paper` its refine module; without it for the ablation."""
-    channels: tuple[Count, Count, Count] | None = None
-    """Channels of `best` or `fast` at half and at quarter resolution, and of the head: fewer are faster, and less
-    accurate.  Default: 64 128 24 and 32 64 12."""
+    channels: tuple[Count, ...] | None = None
+    """Channels of `best`, `fast` or `picture` at half and at quarter resolution, and of the head of the first two:
+    fewer are faster, and less accurate.  Default: 64 128 24, 32 64 12 and 32 64."""
     start: str | None = None
     """Weights to begin from: a file of this command, or `best`, `fast` or `paper` for those that ship.  A network
     with fewer channels, or without the refine module, begins from a larger one.  Default: none."""

@@ -58,7 +58,7 @@ def test_the_ablation(trained, tmp_path):
     "mode, option, modes",
     [
         ("best", "--no-refine", "refine is for paper"),
-        ("paper", "--channels 4 8 3", "channels is for best, fast"),
+        ("paper", "--channels 4 8 3", "channels is for best, fast, picture"),
         ("ssml", "--start best", "start is for best, fast, paper, picture"),
         ("paper", "--teacher best", "teacher is for best, fast"),
         ("ssml", "--validate-passes 3", "validate-passes is for best, fast, paper"),

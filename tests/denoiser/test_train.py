@@ -10,7 +10,7 @@ import pytest
 import torch
 
 from denoiser.online import OnlineDnSS
-from denoiser.passes.recipe import RECIPES
+from denoiser.passes.recipe import RECIPES, PictureRecipe
 from denoiser.training import train as training
 from denoiser.training.resumable_run import Run
 from denoiser.training.rollout import Rollouts
@@ -107,6 +107,14 @@ def test_a_narrow_network_is_trained_and_denoises(small, tmp_path):
     assert "channels" in recipe.to_dict() and "channels" not in RECIPES["best"].to_dict()
     rates = OnlineDnSS.from_file(tmp_path / "best.pt", output="rate").push(np.zeros((64, 8, 12), np.uint8))
     assert rates.shape[1:] == (8, 12) and np.isfinite(rates).all()
+
+
+def test_a_narrow_picture_network_is_trained_and_denoises(small, tmp_path):
+    weights_after(tmp_path, 1, mode="picture", channels=(4, 8), validate_passes=None)
+    recipe, _, record = load_weights(tmp_path / "picture.pt")
+    assert recipe == PictureRecipe(channels=(4, 8)) and "--channels 4 8" in record["command"]
+    pictures = OnlineDnSS.from_file(tmp_path / "picture.pt", output="rate").push(np.zeros((80, 8, 12), np.uint8))
+    assert pictures.shape == (2, 8, 12) and np.isfinite(pictures).all()
 
 
 def test_a_run_begins_from_the_weights_that_are_given(small, tmp_path):
@@ -243,13 +251,19 @@ def test_a_network_learns_on_a_gpu(small, tmp_path):
 
 
 COUNTS = ("steps", "batch", "seed", "threads", "patch", "validate_every")
-OWN_COUNTS = {"best": "validate_passes", "paper": "validate_passes", "ssml": "frames_a_step"}
+OWN_COUNTS = {
+    "best": "validate_passes",
+    "picture": "validate_every",
+    "paper": "validate_passes",
+    "ssml": "frames_a_step",
+}
 BAD = [
     *({"steps": None}, {"seed": None}, {"steps": 0}, {"batch": 0}, {"mode": None}, {"mode": "worst"}, {"out": 3}),
     *({"out": None}, {"resume": "no"}, {"resume": None}, {"device": 0}, {"device": "tpu"}, {"device": "cuda:x"}),
 ]
 OWN = {
     "best": [{"patch": 97}, {"channels": (8, 8)}, {"channels": (8, 8, 0)}, {"channels": "8 8 8"}, {"start": 3}],
+    "picture": [{"channels": (8, 8, 8)}, {"channels": (8, 0)}, {"channels": 8}, {"refine": False}, {"teacher": "best"}],
     "paper": [{"patch": 144}, {"refine": "no"}, {"teacher": "best"}, {"width": 12}],
     "ssml": [{"patch": 193}, {"width": 13}, {"width": 0}, {"refine": False}, {"start": "best"}],
 }
