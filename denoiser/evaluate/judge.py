@@ -63,6 +63,8 @@ class RowResult(CaseRecord):
     """Where nothing moves, of the mean over all frames [dB]."""
     last_db: float | None = None
     """Where nothing moves, of the last picture [dB]."""
+    change: float | None = None
+    """Where nothing moves, from step to step (`measures`)."""
 
 
 def display(radiance: Planes, white: float) -> np.ndarray:
@@ -136,6 +138,7 @@ def _at_rest(spikes: Spikes, planes: Planes | None, truth: Planes, white: float)
     return {
         "mean_db": plain(psnr_db(rates.mean(axis=0, dtype=np.float32), truth, white)),
         "last_db": plain(psnr_db(last, truth, white)),
+        "change": plain(measures.change_of_step(rates, truth)),
     }
 
 

@@ -1,4 +1,4 @@
-"""Measures of rates against the light: time lag, bias, flicker, texture.
+"""Measures of rates against the light: time lag, bias, flicker, texture, change at rest.
 
 All take (T, H, W) arrays in spikes/frame that cover the same frames: the light, and either rate planes or spikes, whose
 quantisation averages out over pixels.  NaN stands for a measure that has no value, e.g. the lag where nothing moves.
@@ -23,6 +23,8 @@ MOVES = 1e-4
 """Least rms variation of the light over its mean for a lag to be defined: float32 sums of still light vary by 1e-7."""
 WELL_LIT = 0.5
 """Share of the mean light from which on a pixel counts as well lit: below it, dark current dominates the bias."""
+STEP = 40
+"""Frames from a picture to the next, of `change_of_step`: an agent's step at 1 kHz."""
 FINE = 2.0
 """Texture is finer than a Gaussian of this standard deviation [pixels]."""
 LOW_CONTRAST = 0.1
@@ -83,6 +85,26 @@ def across_over_within(rates: Frames, light: Frames, planes: int, first: int) ->
         return float("nan")
     within = float(np.square(error[~begins]).mean())
     return float(np.sqrt(np.square(error[begins]).mean() / within)) if within > 0 else float("nan")
+
+
+def change_of_step(pictures: Frames, light: Frames) -> float:
+    """Flicker where nothing moves: rms change of a picture from a step of STEP frames to the next, over the mean light.
+
+    Args:
+        pictures: rate planes, or spikes, whose pictures are their means over a step.
+        light: at rest.
+
+    Returns:
+        Of the second half of the frames, when a denoiser has learned its camera; NaN for fewer than two steps in it.
+    """
+    late = np.asarray(pictures[len(pictures) // 2 :], np.float32)
+    if len(late) < 2 * STEP:
+        return float("nan")
+    if pictures.dtype == np.uint8:
+        sums = np.cumsum(late, axis=0, dtype=np.float64)
+        late = ((sums[STEP:] - sums[:-STEP]) / STEP).astype(np.float32)
+    change = late[STEP:] - late[:-STEP]
+    return float(np.sqrt(np.square(change, dtype=np.float64).mean()) / light.mean(dtype=np.float64))
 
 
 def texture_slope(picture: NDArray[np.floating], light: NDArray[np.floating]) -> float:

@@ -71,16 +71,17 @@ def _measures(group: dict[str, Any], rows: Sequence[str]) -> list[str]:
         return []
     lines = [
         f"{'rates against the light':{WIDTH}}|  bias %    lag | all planes dB   SSIM | flicker  texture "
-        "| mean dB  last dB | dB by place in the pass"
+        "| mean dB  last dB  change % | dB by place in the pass"
     ]
     for row, m in found.items():
         size = None if m["bias"] is None else 100 * m["bias"]
+        change = None if m["change"] is None else 100 * m["change"]
         places = " ".join(number(db, 4, 1) for db in m["db_by_place"])
         lines.append(
             f"{ROWS[row].title:{WIDTH}}| {number(size, 7, 2)} {number(m['lag'], 6, 2)} "
             f"| {number(m['mean_plane']['db'], 13, 2)} {number(m['mean_plane']['ssim'], 6, 3)} "
             f"| {number(m['flicker'], 7, 2)} {number(m['texture'], 8, 2)} "
-            f"| {number(m['mean_db'], 7, 2)} {number(m['last_db'], 8, 2)} | {places}".rstrip()
+            f"| {number(m['mean_db'], 7, 2)} {number(m['last_db'], 8, 2)} {number(change, 9, 2)} | {places}".rstrip()
         )
     return ["\n".join(lines)]
 

@@ -61,7 +61,7 @@ def _row(records: list[RowResult]) -> dict[str, Any]:
         "db_by_place": _by_place(records),
         **{
             name: mean_and_spread([(r.seed, getattr(r, name)) for r in records])[0]
-            for name in ("bias", "lag", "flicker", "texture", "mean_db", "last_db")
+            for name in ("bias", "lag", "flicker", "texture", "mean_db", "last_db", "change")
         },
     }
 

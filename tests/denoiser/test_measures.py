@@ -93,6 +93,19 @@ def test_a_pass_with_an_error_of_its_own_flickers_by_the_ratio_of_the_errors() -
     assert np.isnan(measures.across_over_within(rates, light, 1, 0))
 
 
+def test_the_change_of_a_step_at_rest_is_that_of_independent_noise() -> None:
+    """sqrt(2) sigma of planes; of spikes with probability f, counted over 40 frames, sqrt(2 f (1 - f) / 40)."""
+    rng = np.random.default_rng(3)
+    light = np.full(SHAPE, 0.3)
+    planes = (light + rng.normal(0, 0.02, (200, *SHAPE))).astype(np.float32)
+    spikes = (rng.random((400, *SHAPE)) < light).astype(np.uint8)
+    for frames, expected in ((planes, np.sqrt(2) * 0.02), (spikes, np.sqrt(2 * 0.3 * 0.7 / 40))):
+        found = measures.change_of_step(frames, light)
+        print(f"change {found:.4f}, expected {expected / 0.3:.4f}")
+        assert found == pytest.approx(expected / 0.3, rel=0.03)
+    assert np.isnan(measures.change_of_step(planes[:150], light))
+
+
 def grating(period: float, size: int = 96) -> np.ndarray:
     return np.broadcast_to(np.sin(2 * np.pi * np.arange(size) / period), (size, size))
 
