@@ -18,6 +18,9 @@ from denoiser.weights import write_whole
 from spikecam_env.errors import InputError
 from spikecam_env.untrusted import Declared, Name, Whole, declared
 
+FIRST_NORM = 0.25
+"""Of the first gradient, where it is longer; later ones are measured by those before."""
+
 
 @dataclass
 class Run:
@@ -49,6 +52,23 @@ class Run:
                 group["lr"].fill_(rate)
             else:
                 group["lr"] = rate
+
+    def shorten_gradients(self, most: float) -> None:
+        """Shorten the gradient where its norm is more than `most` times its usual one.
+
+        The usual norm is the root of Adam's second moments: the rms of the norm over the last thousand steps.  Before
+        the first step it is FIRST_NORM.
+        """
+        gradients = [weight.grad for weight in self.network.parameters() if weight.grad is not None]
+        norm = torch.stack(torch._foreach_norm(gradients)).norm()
+        moments = list(self.optimiser.state.values())
+        usual = torch.full_like(norm, FIRST_NORM)
+        if moments:
+            squares = torch.stack([moment["exp_avg_sq"].sum() for moment in moments]).sum()
+            beta = self.optimiser.param_groups[0]["betas"][1]
+            usual = (squares / (1 - beta ** moments[0]["step"])).sqrt().to(norm.device)
+        factor = (most * usual / (norm + 1e-12)).clamp(max=1.0)
+        torch._foreach_mul_(gradients, factor)
 
     def save(self, path: Path) -> None:
         """Write all of it; the file appears whole."""

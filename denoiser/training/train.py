@@ -47,6 +47,9 @@ from spikecam_env.torch_settings import torch_settings
 from spikecam_env.whole import whole_file, write_text_whole
 
 WARM_UP_STEPS = 100
+MOST_GRADIENT = 3.0
+"""Usual norms beyond which a gradient is shortened: single ones cost `picture` 5 dB in 1000 steps.  Nine in ten
+gradients are below 1.8 (measured along 420 steps)."""
 RUN_FILE = "last.pt"
 """File in the folder of a run, from which it is resumed."""
 VALIDATION_SEED = 1_000_003
@@ -180,7 +183,7 @@ def _step(run: Run, source: TrainingSource) -> Tensor:
     run.optimiser.zero_grad(set_to_none=True)
     error = source.loss(run.network)
     error.backward()
-    nn.utils.clip_grad_norm_(run.network.parameters(), 1.0)
+    run.shorten_gradients(MOST_GRADIENT)
     run.optimiser.step()
     return error.detach()
 

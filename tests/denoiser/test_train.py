@@ -250,6 +250,21 @@ def test_a_network_learns_on_a_gpu(small, tmp_path):
     assert all(w.device.type == "cpu" and bool(torch.isfinite(w).all()) for w in weights.values())
 
 
+def test_a_gradient_of_unusual_length_is_shortened_to_three_usual_ones():
+    network = torch.nn.Linear(3, 2)
+    run = Run.begin(network)
+    lengths = []
+    for size in [*[0.1] * 20, 10.0, 0.1]:
+        for weight in network.parameters():
+            weight.grad = torch.full_like(weight, size)
+        run.shorten_gradients(3.0)
+        lengths.append(float(network.bias.grad[0]))
+        run.optimiser.step()
+    print(f"first {lengths[0]:.3f}, usual {lengths[19]:.3f}, long {lengths[20]:.3f}, after it {lengths[21]:.3f}")
+    assert lengths[0] == lengths[19] == lengths[21] == pytest.approx(0.1)
+    assert lengths[20] == pytest.approx(0.3, rel=0.02)
+
+
 COUNTS = ("steps", "batch", "seed", "threads", "patch", "validate_every")
 OWN_COUNTS = {
     "best": "validate_passes",
