@@ -11,7 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from denoiser.online import OnlineDnSS
-from denoiser.passes.recipe import RECIPES
+from denoiser.passes.recipe import MODES, PictureRecipe
+from denoiser.weights import load_weights, pretrained_path
 from spikecam_env.envs.observations import block_shape
 from spikecam_env.errors import InputError, NotReadyError, unknown_name
 
@@ -20,7 +21,8 @@ WARM_UPS = ("black", "noisy")
 
 
 class DenoiseObservation(gymnasium.Wrapper, gymnasium.utils.RecordConstructorArgs):
-    """Replaces each (K, H, W) block of spikes by the denoised block of the same length, `denoiser_latency` frames late.
+    """Replaces each (K, H, W) block of spikes by the denoised block of the same length, `denoiser_latency` frames late;
+    in mode "picture" by one picture (1, H, W), `denoiser_latency` frames old.
 
     Info:
         denoiser_latency, by how many frames the block is late; denoised_frames, how many of its last frames are
@@ -28,9 +30,9 @@ class DenoiseObservation(gymnasium.Wrapper, gymnasium.utils.RecordConstructorArg
 
     Args:
         env: its observations are blocks of spikes.
-        mode: "best", "fast", "paper", the path of a checkpoint (.pt), or an `OnlineDnSS` of your own.  The wrapper
-            takes another one like that: the same weights, stride and precision, a stream of its own.
-        output: "spikes" (same space) or "rate" (float32 in [0, 1]).
+        mode: "best", "fast", "paper", "picture", the path of a checkpoint (.pt), or an `OnlineDnSS` of your own.  The
+            wrapper takes another one like that: the same weights, stride and precision, a stream of its own.
+        output: "spikes" (same space) or "rate" (float32 in [0, 1]), the only one of "picture".
         warm_up: the picture of the first `denoiser_latency` frames of an episode, for which nothing was denoised:
             "black", or "noisy", the first block: its frames over again, or their mean rate.
 
@@ -61,23 +63,27 @@ class DenoiseObservation(gymnasium.Wrapper, gymnasium.utils.RecordConstructorArg
             raise unknown_name("output", output, OUTPUTS)
         if not isinstance(warm_up, str) or warm_up not in WARM_UPS:
             raise unknown_name("warm_up", warm_up, WARM_UPS)
-        block_shape(space)
-        self._denoiser: OnlineDnSS | None = _denoiser(mode, output)
+        frames, *shape = block_shape(space)
+        made = _denoiser(mode, output, frames)
+        self._denoiser: OnlineDnSS | None = made
+        self._one_picture = made.engine.recipe.decoder is None
         self._type = space.dtype if output == "spikes" else np.dtype(np.float32)
         self._warm_up = warm_up
         self._undone = 0  # frames that are due and not denoised
         self._due: NDArray[Any] | None = None  # frames that are denoised and not seen yet; None before the first reset
         if output == "rate":
-            self.observation_space = gymnasium.spaces.Box(0.0, 1.0, space.shape, np.float32)
+            count = 1 if self._one_picture else frames
+            self.observation_space = gymnasium.spaces.Box(0.0, 1.0, (count, *shape), np.float32)
 
     def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[Any, dict[str, Any]]:
         """Begin an episode, and with it another stream."""
         denoiser = self._open()
         observation, info = self.env.reset(seed=seed, options=options)
         denoiser.reset()
-        self._due = self._first_frames(observation, denoiser.latency)
-        self._undone = denoiser.latency
-        return self._late(observation), self._with_latency(info, len(observation))
+        self._undone = 0 if self._one_picture else denoiser.latency
+        self._due = self._first_frames(observation, self._undone)
+        late = self._late(observation)
+        return late, self._with_latency(info, len(late))
 
     def step(self, action: Any) -> tuple[Any, Any, bool, bool, dict[str, Any]]:
         """Step the environment and denoise its observation."""
@@ -96,8 +102,9 @@ class DenoiseObservation(gymnasium.Wrapper, gymnasium.utils.RecordConstructorArg
             raise NotReadyError("the environment has not begun; call reset first")
         ready = np.asarray(self._open().push(block))
         due = np.concatenate([self._due, ready.astype(self._type)])
-        self._due = due[len(block) :]
-        first: NDArray[Any] = due[: len(block)].copy()
+        count = 1 if self._one_picture else len(block)
+        self._due = due[count:]
+        first: NDArray[Any] = due[:count].copy()
         return first
 
     def _first_frames(self, block: NDArray[Any], count: int) -> NDArray[Any]:
@@ -119,19 +126,21 @@ class DenoiseObservation(gymnasium.Wrapper, gymnasium.utils.RecordConstructorArg
         return self._denoiser
 
 
-def _denoiser(mode: Any, output: str) -> OnlineDnSS:
-    """One of the wrapper's own; InputError for one that gives no frames."""
-    made = None if mode == "picture" else _made(mode, output)
-    if made is None or made.engine.recipe.decoder is None:
-        raise InputError("mode 'picture' gives one picture a step, and no block of frames; use obs='rate' instead")
-    return made
-
-
-def _made(mode: Any, output: str) -> OnlineDnSS:
+def _denoiser(mode: Any, output: str, frames: int) -> OnlineDnSS:
+    """One of the wrapper's own, whose step is a block of so many frames where it has one picture a step."""
     if isinstance(mode, OnlineDnSS):
-        return mode.another(output)
-    if isinstance(mode, str) and mode in RECIPES:
-        return OnlineDnSS.pretrained(mode, output=output)
-    if isinstance(mode, os.PathLike) or (isinstance(mode, str) and mode.endswith(".pt")):
-        return OnlineDnSS.from_file(Path(mode), output=output)
-    raise unknown_name("denoiser mode", mode, (*RECIPES, "the path of a checkpoint (.pt)", "an OnlineDnSS"))
+        made = mode.another(output)
+        if made.engine.recipe.decoder is None and made.engine.step != frames:
+            raise InputError(
+                f"the denoiser gives a picture of {made.engine.step} frames, the environment blocks of {frames}; "
+                f"make it with step={frames}"
+            )
+        return made
+    if isinstance(mode, str) and mode in MODES:
+        path = pretrained_path(mode)
+    elif isinstance(mode, os.PathLike) or (isinstance(mode, str) and mode.endswith(".pt")):
+        path = Path(mode)
+    else:
+        raise unknown_name("denoiser mode", mode, (*MODES, "the path of a checkpoint (.pt)", "an OnlineDnSS"))
+    recipe, network, _ = load_weights(path)
+    return OnlineDnSS(recipe, network, output=output, step=frames if isinstance(recipe, PictureRecipe) else None)

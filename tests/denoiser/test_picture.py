@@ -222,10 +222,31 @@ def test_options_of_other_modes_are_refused(options: dict, message: str) -> None
 
 
 @pytest.mark.parametrize("given", ["name", "file", "denoiser"])
-def test_the_wrapper_of_blocks_of_frames_refuses_it_and_says_what_to_use(given: str) -> None:
-    mode = {"name": "picture", "file": str(pretrained_path("picture")), "denoiser": online()}[given]
-    with pytest.raises(InputError, match="no block of frames; use obs='rate'"):
-        DenoiseObservation(RotatingDiskEnv(shape=(16, 24)), mode, "rate")
+def test_the_wrapper_shows_one_picture_a_step(given: str) -> None:
+    """Those of the stream, from the first step on; a second episode is another stream."""
+    stream_of_steps = OnlineDnSS.pretrained("picture", step=40)
+    mode = {"name": "picture", "file": str(pretrained_path("picture")), "denoiser": stream_of_steps}[given]
+    inner = RotatingDiskEnv(shape=(16, 24))
+    env = DenoiseObservation(inner, mode, "rate")
+    blocks = [inner.reset(seed=1)[0], *(inner.step(inner.action_space.sample())[0] for _ in range(3))]
+    expected = stream_of_steps.push(np.concatenate(blocks))
+    for _ in range(2):
+        inner.action_space.seed(0)
+        first, info = env.reset(seed=1)
+        assert info["denoised_frames"] == 1 and info["denoiser_latency"] == 12
+        assert first in env.observation_space and first.shape == (1, 16, 24)
+        assert np.array_equal(first, expected[:1])
+    assert env.step(env.action_space.sample())[0] in env.observation_space
+
+
+def test_the_wrapper_refuses_spikes_and_steps_of_another_length() -> None:
+    env = RotatingDiskEnv(shape=(16, 24))
+    with pytest.raises(InputError, match="gives 'rate' alone"):
+        DenoiseObservation(env, "picture")
+    with pytest.raises(InputError, match="a picture of 16 frames, the environment blocks of 40; make it with step=40"):
+        DenoiseObservation(env, online(step=16), "rate")
+    with pytest.raises(InputError, match="step = 4; it must be a whole number, 8 or more"):
+        DenoiseObservation(RotatingDiskEnv(shape=(16, 24), frames_per_step=4), "picture", "rate")
 
 
 def test_other_modes_refuse_its_options() -> None:
