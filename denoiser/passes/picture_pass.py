@@ -1,29 +1,36 @@
-"""A pass of mode `picture` over inputs of many streams: the network, and its pictures in compiled code.
+"""A pass of mode `picture` over inputs of many streams: the network between two compiled kernels.
 
-The network gives logits and a root of its own for each pixel (`networks.picture_network`).  A kernel makes pictures of
-them in one reading of the planes.  It agrees with the network's own `forward` to 1e-5.
+    planes, hidden picture -> squares (`_square`) -> FusedPicture -> picture, next hidden picture (`_mix`)
+
+The first writes the network's input in its own numbers, in the order in which it is read.  The second reads its output
+and the planes once.  Pictures agree with those of `PictureDnSS.forward` to 1e-5 in float32.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
+from typing import Any, TypeAlias
 
 import numpy as np
 import torch
 from numpy.typing import NDArray
-from torch import Tensor, nn
+from torch import nn
 
+from denoiser.ground.kernel_numbers import as_array, exponential, hyperbolic_tangent, like_number, to_float32
 from denoiser.ground.number_type import computing_in
 from denoiser.ground.strips import share_rows
 from denoiser.ground.torch_threads import where_torch_can
-from denoiser.networks.picture_network import PictureDnSS
-from denoiser.passes.given_network import check_output, has_passes
+from denoiser.networks.picture_network import HIDDEN
+from denoiser.passes.fused_picture import FusedPicture
+from denoiser.passes.given_network import check_output
 from denoiser.passes.infer import Carried, stacked
 from denoiser.passes.pixel_history import PictureInput
 from spikecam_env.compiled import njit
 from spikecam_env.own_code import own_code
+from spikecam_env.sensor.compiled_tools.intrinsics import use_widest_vectors
 from spikecam_env.types import Pictures
+
+Floats: TypeAlias = NDArray[np.float32]
 
 
 def pictures_of(
@@ -36,92 +43,126 @@ def pictures_of(
     """Pictures (1, H, W) in [0, 1] [spikes/frame], and the carried arrays, of as many streams.
 
     Args:
-        network: on the processor, ready for passes; a module of another class is called.
+        network: of `prepared_picture`; a module that is no `FusedPicture` is called.
         inputs: of N streams of one size.
         carried: the hidden picture of each; nothing before its first pass.
         shape: (H, W), without the border that planes are extended by.
         number_type: in which the network computes.
     """
-    return where_torch_can(lambda: _pictures_of(network, inputs, carried, shape, number_type))
 
+    def passed() -> tuple[Pictures, Pictures]:
+        planes = np.stack([one.planes for one in inputs]) if len(inputs) > 1 else inputs[0].planes[None]
+        conditions = np.stack([one.conditions for one in inputs])
+        hidden = next(iter(stacked(carried)), None)
+        with torch.inference_mode():
+            if isinstance(network, FusedPicture):
+                return _fused_pass(network, planes, conditions, hidden)
+            return _called(network, planes, conditions, hidden, number_type)
 
-def _pictures_of(
-    network: Any,
-    inputs: Sequence[PictureInput],
-    carried: Sequence[Carried],
-    shape: tuple[int, int],
-    number_type: torch.dtype,
-) -> list[tuple[Pictures, Carried]]:
-    planes = np.stack([one.planes for one in inputs]) if len(inputs) > 1 else inputs[0].planes[None]
-    before = stacked(carried)
-    given = (
-        torch.from_numpy(planes).permute(0, 3, 1, 2),
-        torch.from_numpy(np.stack([one.conditions for one in inputs])),
-        torch.from_numpy(before[0]).contiguous(memory_format=torch.channels_last) if before else None,
-    )
+    pictures, left = where_torch_can(passed)
     height, width = shape
-    with torch.inference_mode(), computing_in(number_type, torch.device("cpu")):
-        if has_passes(network):
-            out, kept = network.passed(*given)
-            pictures = _painted(network, out, planes)
-        else:
-            with own_code(f"network {type(network).__name__}"):
-                found = network(*given)
-            rate, (kept, *_) = check_output(network, found, (len(planes), 1, *planes.shape[1:3]))
-            pictures = rate[:, 0].float().clamp(0.0, 1.0).numpy()
-    left = kept.float().contiguous().numpy()
     return [(np.ascontiguousarray(pictures[n, None, :height, :width]), (left[n],)) for n in range(len(inputs))]
 
 
-def _painted(network: PictureDnSS, out: Tensor, planes: NDArray[np.float32]) -> Pictures:
-    """Pictures (N, H', W') of the network's logits."""
-    logits = out.permute(0, 2, 3, 1).float().contiguous().numpy()
-    pictures = np.empty(planes.shape[:3], np.float32)
+def _called(
+    network: Any, planes: Pictures, conditions: Floats, hidden: Pictures | None, number_type: torch.dtype
+) -> tuple[Pictures, Pictures]:
+    """The same of a user's module."""
+    given = [None if array is None else torch.from_numpy(array) for array in (planes, conditions, hidden)]
+    with computing_in(number_type, torch.device("cpu")), own_code(f"network {type(network).__name__}"):
+        found = network(*given)
+    rate, (kept, *_) = check_output(network, found, (len(planes), 1, *planes.shape[2:]))
+    return rate[:, 0].float().clamp(0.0, 1.0).numpy(), kept.float().contiguous().numpy()
 
-    def paint(n: int, rows: slice) -> None:
-        _pictures(logits[n], planes[n], network.rates, network.dark, rows.start, rows.stop, pictures[n])
 
-    share_rows(paint, len(planes), planes.shape[1] // 2, planes.size)
-    return pictures
+def _fused_pass(
+    network: FusedPicture, planes: Pictures, conditions: Floats, hidden: Pictures | None
+) -> tuple[Pictures, Pictures]:
+    """Pictures (N, H', W'), and hidden pictures (N, HIDDEN, H'/2, W'/2), of planes (N, layers, H', W')."""
+    streams, _, height, width = planes.shape
+    half = streams, height // 2, width // 2
+    if hidden is None:
+        hidden = np.zeros((streams, HIDDEN, *half[1:]), np.float32)
+    squares = torch.empty((*half, network.columns), dtype=network.type)
+    numbers = as_array(squares)
+
+    def squared(n: int, rows: slice) -> None:
+        _square(planes[n], hidden[n], conditions[n], rows.start, rows.stop, numbers[n])
+
+    share_rows(squared, streams, half[1], planes.size)
+    outputs, biases = as_array(network(squares)), network.biases.numpy()
+    pictures, left = np.empty((streams, height, width), np.float32), np.empty_like(hidden)
+
+    def mixed(n: int, rows: slice) -> None:
+        _mix(outputs, biases, planes[n], n, network.rates, network.dark, rows.start, rows.stop, pictures[n], left[n])
+
+    share_rows(mixed, streams, half[1], planes.size)
+    return pictures, left
 
 
-@njit(cache=True, nogil=True, boundscheck=False, error_model="numpy", fastmath={"reassoc", "contract"})
-def _pictures(
-    logits: NDArray[np.float32],
-    planes: NDArray[np.float32],
+@njit(cache=True, nogil=True, boundscheck=False, error_model="numpy")
+def _square(
+    planes: Floats, hidden: Floats, conditions: Floats, begin: int, stop: int, squares: NDArray[Any]
+) -> None:
+    """Rows begin .. stop of squares (H/2, W/2, columns): 4 numbers of each plane, hidden picture, conditions, zeros."""
+    layers, like = len(planes), squares[0, 0, 0]
+    at = 4 * layers
+    end = at + len(hidden)
+    for row in range(begin, stop):
+        for layer in range(layers):
+            for corner in range(4):
+                y, right, to = 2 * row + corner // 2, corner % 2, 4 * layer + corner
+                for x in range(squares.shape[1]):
+                    squares[row, x, to] = like_number(planes[layer, y, 2 * x + right], like)
+        for channel in range(len(hidden)):
+            for x in range(squares.shape[1]):
+                squares[row, x, at + channel] = like_number(hidden[channel, row, x], like)
+        for x in range(squares.shape[1]):
+            for i in range(conditions.size):
+                squares[row, x, end + i] = like_number(conditions[i], like)
+            squares[row, x, end + conditions.size :] = 0
+
+
+@njit(cache=True, nogil=True, boundscheck=False, error_model="numpy", fastmath={"contract"})
+def _mix(
+    outputs: NDArray[Any],
+    biases: Floats,
+    planes: Floats,
+    n: int,
     rates: int,
     dark: float,
     begin: int,
     stop: int,
-    pictures: NDArray[np.float32],
+    picture: Floats,
+    hidden: Floats,
 ) -> None:
-    """Pictures (H, W) of the squares' rows begin .. stop, from logits (H/2, W/2, 4 (rates + 2))."""
-    share = np.empty(rates + 1, np.float32)
+    """Picture (H, W) and hidden picture (HIDDEN, H/2, W/2) of a stream, of the squares' rows begin .. stop."""
+    use_widest_vectors()
+    width = outputs.shape[3]
+    most, total, blend = np.empty((3, width), np.float32)
+    zero, one, below = np.float32(0.0), np.float32(1.0), np.float32(dark)
     for row in range(begin, stop):
-        for column in range(logits.shape[1]):
-            for corner in range(4):
-                y, x, first = 2 * row + corner // 2, 2 * column + corner % 2, corner * (rates + 2)
-                most = np.float32(-1e30)
-                for i in range(rates + 1):
-                    most = max(most, logits[row, column, first + i])
-                for i in range(rates + 1):
-                    share[i] = _exponential(logits[row, column, first + i] - most)
-                own = logits[row, column, first + rates + 1]
-                total, blend = share[rates], share[rates] * own * own
-                for i in range(rates):
-                    total += share[i]
-                    blend += share[i] * planes[y, x, i] * planes[y, x, i]
-                pictures[y, x] = min(max(blend / total - np.float32(dark), np.float32(0.0)), np.float32(1.0))
-
-
-@njit(cache=True, nogil=True, boundscheck=False, error_model="numpy")
-def _exponential(x: np.float32) -> Any:
-    """exp(x) for x <= 0, exp(-16) below -16: (series of exp(x / 32)) ^ 32, whose error is below 1e-5 above -8."""
-    t = max(x, np.float32(-16.0)) * np.float32(1 / 32)
-    y = np.float32(1) + t * (
-        np.float32(1)
-        + t * (np.float32(1 / 2) + t * (np.float32(1 / 6) + t * (np.float32(1 / 24) + t * np.float32(1 / 120))))
-    )
-    for _ in range(5):
-        y *= y
-    return y
+        for corner in range(4):
+            first, y, right = corner * (rates + 2), 2 * row + corner // 2, corner % 2
+            logits, own = outputs[first : first + rates + 1, n, row], outputs[first + rates + 1, n, row]
+            bias = biases[first : first + rates + 2]
+            most[:], total[:], blend[:] = np.float32(-1e30), zero, zero
+            for i in range(rates + 1):
+                for x in range(width):
+                    most[x] = max(most[x], to_float32(logits[i, x]) + bias[i])
+            for i in range(rates):
+                for x in range(width):
+                    share = exponential(to_float32(logits[i, x]) + bias[i] - most[x])
+                    root = planes[i, y, 2 * x + right]
+                    total[x] += share
+                    blend[x] += share * root * root
+            for x in range(width):
+                share = exponential(to_float32(logits[rates, x]) + bias[rates] - most[x])
+                root = to_float32(own[x]) + bias[rates + 1]
+                light = (blend[x] + share * root * root) / (total[x] + share) - below
+                picture[y, 2 * x + right] = min(max(light, zero), one)
+        at = 4 * (rates + 2)
+        for channel in range(len(hidden)):
+            kept = outputs[at + channel, n, row]
+            for x in range(width):
+                hidden[channel, row, x] = hyperbolic_tangent(to_float32(kept[x]) + biases[at + channel])

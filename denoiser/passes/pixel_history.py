@@ -40,6 +40,7 @@ from denoiser.ground.strips import share_rows
 from denoiser.passes.pixel_map import PixelMap
 from denoiser.passes.window import WINDOW_PRIOR, check_like
 from spikecam_env.compiled import njit
+from spikecam_env.sensor.compiled_tools.intrinsics import use_widest_vectors
 from spikecam_env.streams.bits import as_words, by_pixel, highest, lowest, ones
 from spikecam_env.streams.packing import pack_frames
 from spikecam_env.types import Pictures
@@ -120,7 +121,7 @@ class PictureInput:
 
     start: int
     planes: Pictures
-    """(H', W', layers), H' and W' extended to a multiple of MULTIPLE."""
+    """(layers, H', W'), H' and W' extended to a multiple of MULTIPLE."""
     conditions: NDArray[np.float32]
     """(CONDITIONS,)."""
 
@@ -254,7 +255,7 @@ class PixelHistory:
         layout = self.layout
         look = min(self.look, self.seen - 1)
         height, width = self.shape
-        planes = np.empty((height + -height % MULTIPLE, width + -width % MULTIPLE, layout.layers), np.float32)
+        planes = np.empty((layout.layers, height + -height % MULTIPLE, width + -width % MULTIPLE), np.float32)
         instants = np.clip(look + np.asarray(layout.instants), 0, HISTORY - 1)
         counts, widths = np.asarray(layout.counts), np.asarray(layout.half_widths)
         weights = np.asarray([1 / (1 - (1 - 1 / m) ** self.seen) for m in layout.memories], np.float32)[:, None]
@@ -267,12 +268,12 @@ class PixelHistory:
             _paint(
                 self._bits[:, of_rows], self._before[of_rows], self.seen, look, instants, counts, widths,
                 means[:, of_rows], self._last[of_rows], self._sums[:, of_rows], self._changed[of_rows],
-                gain[of_rows], dark[of_rows], planes[rows],
+                gain[of_rows], dark[of_rows], planes[:, rows],
             )  # fmt: skip
 
         share_rows(painted, 1, height, planes.size)
-        planes[:height, width:] = planes[:height, width - 1 : width]
-        planes[height:] = planes[height - 1 : height]
+        planes[:, :height, width:] = planes[:, :height, width - 1 : width]
+        planes[:, height:] = planes[:, height - 1 : height]
         conditions = conditions_of(self._stood_for, look, self.seen, mapped=self.unit is not None)
         return PictureInput(self.seen - 1 - look, planes, conditions)
 
@@ -401,12 +402,13 @@ def _paint(
     mapped_dark: NDArray[np.float32],
     planes: NDArray[np.float32],
 ) -> None:
-    """The planes (rows, columns, layers) of some rows, whose border is not painted."""
-    width = last_before.size // len(planes)
+    """The planes (layers, rows, columns) of some rows, whose border is not painted."""
+    use_widest_vectors()
+    width = last_before.size // planes.shape[1]
     newest, still_open, older, younger = np.empty((4, width), np.int64)
     rates = instants.size + counts.size + widths.size + 1
     spikes, frames = np.ones((rates, width), np.int64), np.empty((rates, width), np.int64)
-    for row in range(len(planes)):
+    for row in range(planes.shape[1]):
         mine = slice(width * row, width * (row + 1))
         bits, before = all_bits[:, mine], last_before[mine].astype(np.int64)
         _find_older(bits, before, 0, newest)
@@ -441,7 +443,7 @@ def _paint(
             at += 1
         _correct(
             spikes, frames, means[:, mine], last[mine], sums[:, mine], changed[mine], mapped_gain[mine],
-            mapped_dark[mine], planes[row],
+            mapped_dark[mine], planes[:, row],
         )  # fmt: skip
 
 
@@ -457,7 +459,8 @@ def _correct(
     mapped_dark: NDArray[np.float32],
     planes: NDArray[np.float32],
 ) -> None:
-    """Roots of rates, without the pixel's gain, and the planes about it, of a row: (pixels, layers)."""
+    """Roots of rates, without the pixel's gain, and the planes about it, of a row: (layers, pixels)."""
+    use_widest_vectors()
     one, zero, root_dark, prior = np.float32(1.0), np.float32(0.0), np.float32(DARK), np.float32(WINDOW_PRIOR)
     width, counted, averaged = last.size, len(spikes), len(means)
     gain, dark = np.empty(width, np.float32), np.zeros(width, np.float32)
@@ -465,21 +468,18 @@ def _correct(
         gain[x] = min(max((sums[0, x] + prior) / (sums[1, x] + prior), np.float32(0.5)), np.float32(2.0))
     if mapped_gain.size:
         gain[:], dark[:] = mapped_gain, mapped_dark
-    root = np.empty((counted + averaged, width), np.float32)
     for i in range(counted):
         for x in range(width):
             rate = np.float32(spikes[i, x]) / np.float32(frames[i, x])
-            root[i, x] = np.sqrt(max(rate - dark[x], zero) / gain[x] + root_dark)
+            planes[i, x] = np.sqrt(max(rate - dark[x], zero) / gain[x] + root_dark)
     for i in range(averaged):
         for x in range(width):
-            root[counted + i, x] = np.sqrt(max(means[i, x] - dark[x], zero) / gain[x] + root_dark)
+            planes[counted + i, x] = np.sqrt(max(means[i, x] - dark[x], zero) / gain[x] + root_dark)
     at = counted + averaged
     for x in range(width):
-        for i in range(at):
-            planes[x, i] = root[i, x]
-        planes[x, at] = np.sqrt(last[x] + root_dark)
-        planes[x, at + 1] = np.float32(4.0) * (gain[x] - one)
-        planes[x, at + 2] = one if mapped_gain.size else changed[x] / (one + changed[x])
+        planes[at, x] = np.sqrt(last[x] + root_dark)
+        planes[at + 1, x] = np.float32(4.0) * (gain[x] - one)
+        planes[at + 2, x] = one if mapped_gain.size else changed[x] / (one + changed[x])
 
 
 @njit(cache=True, nogil=True, boundscheck=False, error_model="numpy")
