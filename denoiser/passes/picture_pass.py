@@ -31,6 +31,8 @@ from spikecam_env.sensor.compiled_tools.intrinsics import use_widest_vectors
 from spikecam_env.types import Pictures
 
 Floats: TypeAlias = NDArray[np.float32]
+FOURS = {2: np.uint64, 4: np.complex128}
+"""Types that hold four of a network's numbers, by the bytes of one."""
 
 
 def pictures_of(
@@ -85,9 +87,11 @@ def _fused_pass(
         hidden = np.zeros((streams, HIDDEN, *half[1:]), np.float32)
     squares = torch.empty((*half, network.columns), dtype=network.type)
     numbers = as_array(squares)
+    fours = numbers.view(FOURS[numbers.dtype.itemsize])
 
     def squared(n: int, rows: slice) -> None:
-        _square(planes[n], hidden[n], conditions[n], rows.start, rows.stop, numbers[n])
+        row = np.zeros((network.columns // 4, 4 * half[2]), numbers.dtype)
+        _square(planes[n], hidden[n], conditions[n], rows.start, rows.stop, row, fours[n])
 
     share_rows(squared, streams, half[1], planes.size)
     outputs, biases = as_array(network(squares)), network.biases.numpy()
@@ -102,25 +106,52 @@ def _fused_pass(
 
 @njit(cache=True, nogil=True, boundscheck=False, error_model="numpy")
 def _square(
-    planes: Floats, hidden: Floats, conditions: Floats, begin: int, stop: int, squares: NDArray[Any]
+    planes: Floats, hidden: Floats, conditions: Floats, begin: int, stop: int, row: NDArray[Any], squares: NDArray[Any]
 ) -> None:
-    """Rows begin .. stop of squares (H/2, W/2, columns): 4 numbers of each plane, hidden picture, conditions, zeros."""
-    layers, like = len(planes), squares[0, 0, 0]
-    at = 4 * layers
-    end = at + len(hidden)
-    for row in range(begin, stop):
+    """Rows begin .. stop of squares (H/2, W/2, columns / 4): 4 pixels of each plane, hidden picture, conditions, zeros.
+
+    Args:
+        planes: (layers, H, W).
+        hidden: (HIDDEN, H/2, W/2).
+        conditions: (CONDITIONS,).
+        begin: the first row.
+        stop: the row after the last.
+        row: (columns / 4, 4 W/2) zeros in the network's numbers, memory for a row.
+        squares: to write; an element is four of the network's numbers, and is stored as one.
+    """
+    layers, width, like = len(planes), squares.shape[1], row[0, 0]
+    given = layers + len(hidden) // 4
+    for x in range(width):
+        for i in range(4):
+            row[given, 4 * x + i] = like_number(conditions[i], like)
+    fours = row.view(squares.dtype)
+    for y in range(begin, stop):
         for layer in range(layers):
-            for corner in range(4):
-                y, right, to = 2 * row + corner // 2, corner % 2, 4 * layer + corner
-                for x in range(squares.shape[1]):
-                    squares[row, x, to] = like_number(planes[layer, y, 2 * x + right], like)
+            _put_together(planes[layer, 2 * y], planes[layer, 2 * y + 1], row[layer])
         for channel in range(len(hidden)):
-            for x in range(squares.shape[1]):
-                squares[row, x, at + channel] = like_number(hidden[channel, row, x], like)
-        for x in range(squares.shape[1]):
-            for i in range(conditions.size):
-                squares[row, x, end + i] = like_number(conditions[i], like)
-            squares[row, x, end + conditions.size :] = 0
+            _put_at(hidden[channel, y], channel % 4, row[layers + channel // 4])
+        for x in range(width):
+            for i in range(len(fours)):
+                squares[y, x, i] = fours[i, x]
+
+
+@njit(cache=True, nogil=True, boundscheck=False, error_model="numpy")
+def _put_together(above: Floats, below: Floats, fours: NDArray[Any]) -> None:
+    """Squares of 2 x 2 pixels, of two rows (W,), one after another (2 W,)."""
+    use_widest_vectors()
+    for x in range(above.size // 2):
+        fours[4 * x] = like_number(above[2 * x], fours[0])
+        fours[4 * x + 1] = like_number(above[2 * x + 1], fours[0])
+        fours[4 * x + 2] = like_number(below[2 * x], fours[0])
+        fours[4 * x + 3] = like_number(below[2 * x + 1], fours[0])
+
+
+@njit(cache=True, nogil=True, boundscheck=False, error_model="numpy")
+def _put_at(values: Floats, at: int, fours: NDArray[Any]) -> None:
+    """Values (W,) as the number `at` of each four (4 W,)."""
+    use_widest_vectors()
+    for x in range(values.size):
+        fours[4 * x + at] = like_number(values[x], fours[0])
 
 
 @njit(cache=True, nogil=True, boundscheck=False, error_model="numpy", fastmath={"contract"})
@@ -138,31 +169,33 @@ def _mix(
 ) -> None:
     """Picture (H, W) and hidden picture (HIDDEN, H/2, W/2) of a stream, of the squares' rows begin .. stop."""
     use_widest_vectors()
-    width = outputs.shape[3]
-    most, total, blend = np.empty((3, width), np.float32)
+    width, own = outputs.shape[3], rates + 1
+    most, total, blend = np.empty(width, np.float32), np.empty(width, np.float32), np.empty(width, np.float32)
     zero, one, below = np.float32(0.0), np.float32(1.0), np.float32(dark)
     for row in range(begin, stop):
         for corner in range(4):
             first, y, right = corner * (rates + 2), 2 * row + corner // 2, corner % 2
-            logits, own = outputs[first : first + rates + 1, n, row], outputs[first + rates + 1, n, row]
-            bias = biases[first : first + rates + 2]
             most[:], total[:], blend[:] = np.float32(-1e30), zero, zero
-            for i in range(rates + 1):
+            for i in range(first, first + own):
+                logits, bias = outputs[i, n, row], biases[i]
                 for x in range(width):
-                    most[x] = max(most[x], to_float32(logits[i, x]) + bias[i])
+                    most[x] = max(most[x], to_float32(logits[x]) + bias)
             for i in range(rates):
+                logits, bias, roots = outputs[first + i, n, row], biases[first + i], planes[i, y]
                 for x in range(width):
-                    share = exponential(to_float32(logits[i, x]) + bias[i] - most[x])
-                    root = planes[i, y, 2 * x + right]
+                    share = exponential(to_float32(logits[x]) + bias - most[x])
+                    root = roots[2 * x + right]
                     total[x] += share
                     blend[x] += share * root * root
+            logits, bias, roots, own_bias = outputs[first + rates, n, row], biases[first + rates], outputs[first + own, n, row], biases[first + own]
+            out = picture[y]
             for x in range(width):
-                share = exponential(to_float32(logits[rates, x]) + bias[rates] - most[x])
-                root = to_float32(own[x]) + bias[rates + 1]
+                share = exponential(to_float32(logits[x]) + bias - most[x])
+                root = to_float32(roots[x]) + own_bias
                 light = (blend[x] + share * root * root) / (total[x] + share) - below
-                picture[y, 2 * x + right] = min(max(light, zero), one)
+                out[2 * x + right] = min(max(light, zero), one)
         at = 4 * (rates + 2)
         for channel in range(len(hidden)):
-            kept = outputs[at + channel, n, row]
+            kept, bias, left = outputs[at + channel, n, row], biases[at + channel], hidden[channel, row]
             for x in range(width):
-                hidden[channel, row, x] = hyperbolic_tangent(to_float32(kept[x]) + biases[at + channel])
+                left[x] = hyperbolic_tangent(to_float32(kept[x]) + bias)
