@@ -15,7 +15,7 @@ import torch
 from torch import Tensor, nn
 from torch.nn import functional
 
-from denoiser.networks.picture_network import HIDDEN, PictureDnSS
+from denoiser.networks.picture_network import PictureDnSS
 from denoiser.passes.given_network import has_passes
 from denoiser.passes.infer import prepared
 
@@ -75,9 +75,7 @@ def _convolved(
     return functional.relu_(found if addend is None else found.add_(addend))
 
 
-def _fused(
-    x: Tensor, weight: Tensor, bias: Tensor | None, stride: int, padding: int, addend: Tensor | None
-) -> Tensor:
+def _fused(x: Tensor, weight: Tensor, bias: Tensor | None, stride: int, padding: int, addend: Tensor | None) -> Tensor:
     """The operators that torch's own compiler uses on processors."""
     how = (weight, bias, [padding] * 2, [stride] * 2, [1, 1], 1)
     operator = torch.ops.mkldnn._convolution_pointwise

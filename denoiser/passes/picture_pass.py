@@ -187,8 +187,8 @@ def _mix(
                     root = roots[2 * x + right]
                     total[x] += share
                     blend[x] += share * root * root
-            logits, bias, roots, own_bias = outputs[first + rates, n, row], biases[first + rates], outputs[first + own, n, row], biases[first + own]
-            out = picture[y]
+            logits, bias = outputs[first + rates, n, row], biases[first + rates]
+            roots, own_bias, out = outputs[first + own, n, row], biases[first + own], picture[y]
             for x in range(width):
                 share = exponential(to_float32(logits[x]) + bias - most[x])
                 root = to_float32(roots[x]) + own_bias

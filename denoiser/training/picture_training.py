@@ -25,8 +25,8 @@ from numpy.typing import NDArray
 from torch import Tensor, nn
 
 from denoiser.ground.number_type import computing_in, number_type
+from denoiser.passes.history_kernels import DARK
 from denoiser.passes.pixel_history import (
-    DARK,
     HISTORY,
     TYPICAL_LOOK,
     TYPICAL_STEP,

@@ -9,8 +9,9 @@ import torch
 from denoiser import DenoiseObservation, OnlineDnSS
 from denoiser.many import ManyDnSS
 from denoiser.passes.fused_picture import prepared_picture
+from denoiser.passes.history_kernels import DARK
 from denoiser.passes.picture_pass import pictures_of
-from denoiser.passes.pixel_history import DARK, PictureLayout, PixelHistory
+from denoiser.passes.pixel_history import PictureLayout, PixelHistory
 from denoiser.passes.pixel_map import PixelMap
 from denoiser.passes.recipe import PictureRecipe
 from denoiser.weights import load_weights, pretrained_path, save_weights
@@ -128,9 +129,7 @@ def test_the_compiled_pass_gives_the_networks_own_pictures() -> None:
     both = pictures_of(prepared_picture(network, torch.float32), inputs, [(), ()], (24, 20), torch.float32)
     for given, (picture, (hidden,)) in zip(inputs, both, strict=True):
         with torch.inference_mode():
-            rate, (kept,) = network(
-                torch.from_numpy(given.planes[None]), torch.from_numpy(given.conditions[None])
-            )
+            rate, (kept,) = network(torch.from_numpy(given.planes[None]), torch.from_numpy(given.conditions[None]))
         np.testing.assert_allclose(picture, rate[0].clamp(0, 1), atol=1e-5)
         np.testing.assert_allclose(hidden, kept[0], atol=1e-5)
 
