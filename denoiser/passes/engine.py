@@ -13,6 +13,7 @@ from torch import nn
 
 from denoiser.ground.number_type import PRECISIONS, number_type
 from denoiser.passes import infer
+from denoiser.passes.fused_picture import prepared_picture
 from denoiser.passes.given_network import check_network, has_passes
 from denoiser.passes.picture_pass import pictures_of
 from denoiser.passes.pixel_history import (
@@ -45,7 +46,7 @@ class Engine:
 
     recipe: AnyRecipe
     network: nn.Module
-    """As `infer.prepared` makes it, on the device."""
+    """As `infer.prepared` or `prepared_picture` makes it, on the device."""
     type: torch.dtype
     """In which it computes."""
     kind: str = "torch"
@@ -99,7 +100,7 @@ class Engine:
         if kind == "captured" and place is None:
             raise InputError("engine 'captured' replays passes on a device; give one, device='cuda', or take 'torch'")
         its_type = number_type(precision, place)
-        network = infer.prepared(network, its_type)
+        network = prepared_picture(network, its_type) if one_picture else infer.prepared(network, its_type)
         if place is not None:
             network = _moved(network, place)
         return cls(recipe, network, its_type, kind, int(stride), unit, place, step, look)

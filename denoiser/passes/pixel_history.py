@@ -31,16 +31,16 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
-from typing import Any, TypeAlias
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from denoiser.ground.strips import share_rows
+from denoiser.passes.history_kernels import advance, learn, paint
 from denoiser.passes.pixel_map import PixelMap
-from denoiser.passes.window import WINDOW_PRIOR, check_like
-from spikecam_env.compiled import njit
-from spikecam_env.streams.bits import as_words, by_pixel, highest, lowest, ones
+from denoiser.passes.window import check_like
+from spikecam_env.streams.bits import as_words
 from spikecam_env.streams.packing import pack_frames
 from spikecam_env.types import Pictures
 
@@ -50,10 +50,6 @@ WORD = 64
 """Frames that are taken in at a time."""
 LINE = 16 * WORD
 """Pixels of a strip's line: threads take 16 lines at a time, which is 0.2 ms of work, so that they hardly meet."""
-OLDEST = 1 << 20
-"""Greatest age of a spike [frames]: exact in float32."""
-DARK = 0.01
-"""Rate that is added under a root or a logarithm [spikes/frame]; chosen here."""
 MULTIPLE = 4
 """Planes are extended to a multiple of so many rows and columns, by repeating the border."""
 LOOKS = (4, 24)
@@ -65,14 +61,6 @@ LONGEST_KNOWN_STEP = 256
 """Steps beyond it look the same to the network [frames]."""
 YOUTH = 256.0
 """Time in which a stream is no longer young, to the network [frames]."""
-
-_Q = np.uint64
-_ALL = _Q(0xFFFFFFFFFFFFFFFF)
-_ONE = _Q(1)
-
-Words: TypeAlias = NDArray[np.uint64]
-"""(2, pixels), of ages 0 .. 63 and 64 .. 127; bit a is age a."""
-Counts: TypeAlias = NDArray[np.int64]
 
 
 @dataclass(frozen=True)
@@ -120,7 +108,7 @@ class PictureInput:
 
     start: int
     planes: Pictures
-    """(H', W', layers), H' and W' extended to a multiple of MULTIPLE."""
+    """(layers, H', W'), H' and W' extended to a multiple of MULTIPLE."""
     conditions: NDArray[np.float32]
     """(CONDITIONS,)."""
 
@@ -195,9 +183,9 @@ class PixelHistory:
         of_last = np.float32(frames / (2 * self._stood_for) if self._pictures else 0.0)
 
         def learned(pixels: slice) -> None:
-            _learn(
-                self._bits[:, pixels], picture[pixels], self._last[pixels], look, frames, of_last, kept,
-                self._sums[:, pixels], self._changed[pixels],
+            learn(
+                *self._bits[:, pixels], picture[pixels], self._last[pixels], look, frames, of_last, kept,
+                *self._sums[:, pixels], self._changed[pixels],
             )  # fmt: skip
 
         self._share(learned)
@@ -239,9 +227,8 @@ class PixelHistory:
         shares = np.asarray([1 - (1 - 1 / m) ** frames for m in self.layout.memories], np.float32)
 
         def advanced(pixels: slice) -> None:
-            _advance(
-                words[:, pixels.start // WORD : -(-pixels.stop // WORD)], self._bits[:, pixels], self._before[pixels],
-                shares, self._means[:, pixels],
+            advance(
+                words, pixels.start, *self._bits[:, pixels], self._before[pixels], shares, self._means,
             )  # fmt: skip
 
         self._share(advanced)
@@ -254,7 +241,7 @@ class PixelHistory:
         layout = self.layout
         look = min(self.look, self.seen - 1)
         height, width = self.shape
-        planes = np.empty((height + -height % MULTIPLE, width + -width % MULTIPLE, layout.layers), np.float32)
+        planes = np.empty((layout.layers, height + -height % MULTIPLE, width + -width % MULTIPLE), np.float32)
         instants = np.clip(look + np.asarray(layout.instants), 0, HISTORY - 1)
         counts, widths = np.asarray(layout.counts), np.asarray(layout.half_widths)
         weights = np.asarray([1 / (1 - (1 - 1 / m) ** self.seen) for m in layout.memories], np.float32)[:, None]
@@ -263,16 +250,14 @@ class PixelHistory:
         means = self._means * weights
 
         def painted(_: int, rows: slice) -> None:
-            of_rows = slice(width * rows.start, width * rows.stop)
-            _paint(
-                self._bits[:, of_rows], self._before[of_rows], self.seen, look, instants, counts, widths,
-                means[:, of_rows], self._last[of_rows], self._sums[:, of_rows], self._changed[of_rows],
-                gain[of_rows], dark[of_rows], planes[rows],
+            paint(
+                rows.start, rows.stop, width, *self._bits, self._before, self.seen, look, instants, counts, widths,
+                means, self._last, *self._sums, self._changed, gain, dark, planes,
             )  # fmt: skip
 
         share_rows(painted, 1, height, planes.size)
-        planes[:height, width:] = planes[:height, width - 1 : width]
-        planes[height:] = planes[height - 1 : height]
+        planes[:, :height, width:] = planes[:, :height, width - 1 : width]
+        planes[:, height:] = planes[:, height - 1 : height]
         conditions = conditions_of(self._stood_for, look, self.seen, mapped=self.unit is not None)
         return PictureInput(self.seen - 1 - look, planes, conditions)
 
@@ -294,214 +279,3 @@ def conditions_of(step: int, look: int, seen: int, *, mapped: bool) -> NDArray[n
     known_step = min(step, LONGEST_KNOWN_STEP)
     youth = np.exp(-seen / YOUTH)
     return np.asarray([np.log2(known_step / TYPICAL_STEP) / 2, look / TYPICAL_LOOK - 1, youth, mapped], np.float32)
-
-
-@njit(cache=True, nogil=True, boundscheck=False, error_model="numpy")
-def _advance(
-    words: NDArray[np.uint64],
-    bits: Words,
-    before: NDArray[np.int32],
-    shares: NDArray[np.float32],
-    means: NDArray[np.float32],
-) -> None:
-    """Take n <= 64 frames into the history; words (n, pixels / 64) hold the newest first."""
-    frames, pixels = words.shape[0], before.size
-    new, kept, rest = np.empty((64, 1), np.uint64), _Q(frames - 1), _Q(64 - frames)
-    share = np.float32(1.0) / np.float32(frames)
-    for column in range(words.shape[1]):
-        by_pixel(words, column, new)
-        first = 64 * column
-        count = min(64, pixels - first)
-        for i in range(count):  # no branch in it, so that the compiler does eight pixels at a time
-            recent, old = bits[0, first + i], bits[1, first + i]
-            leaving = old >> rest
-            bits[1, first + i] = ((old << kept) << _ONE) | (recent >> rest)
-            bits[0, first + i] = ((recent << kept) << _ONE) | new[i, 0]
-            aged = min(before[first + i] + np.int32(frames), np.int32(OLDEST))
-            before[first + i] = np.int32(128) + np.int32(lowest(leaving)) if leaving else aged
-        for m in range(shares.size):
-            for i in range(count):
-                rate = np.float32(np.int64(ones(new[i, 0]))) * share
-                means[m, first + i] += shares[m] * (rate - means[m, first + i])
-
-
-# The loops below are over a row of pixels, without branches, so that the compiler does eight pixels at a time.
-
-
-@njit(cache=True, nogil=True, boundscheck=False, error_model="numpy")
-def _below(age: int) -> Any:
-    """The bits 0 .. age of a word, without that of `age`; none below 0, all from 64 on."""
-    held = min(max(age, 1), 64)
-    return _ALL >> _Q(64 - held) if age > 0 else _Q(0)
-
-
-@njit(cache=True, nogil=True, boundscheck=False, error_model="numpy")
-def _count(bits: Words, first: int, stop: int, out: Counts) -> None:
-    """Spikes of ages first .. stop, without `stop` (128 or less)."""
-    recent, old = _below(stop) & ~_below(first), _below(stop - 64) & ~_below(first - 64)
-    for x in range(out.size):
-        out[x] = np.int64(ones(bits[0, x] & recent) + ones(bits[1, x] & old))
-
-
-@njit(cache=True, nogil=True, boundscheck=False, error_model="numpy")
-def _find_older(bits: Words, before: Counts, age: int, out: Counts) -> None:
-    """Age of the youngest spike of `age` (below 128) or more."""
-    shift, shift_old = _Q(min(age, 63)), _Q(max(age - 64, 0))
-    for x in range(out.size):
-        recent = bits[0, x] >> shift if age < 64 else _Q(0)
-        old = bits[1, x] >> shift_old
-        found = np.int64(max(age, 64)) + np.int64(lowest(old)) if old else before[x]
-        out[x] = np.int64(age) + np.int64(lowest(recent)) if recent else found
-
-
-@njit(cache=True, nogil=True, boundscheck=False, error_model="numpy")
-def _find_younger(bits: Words, age: int, out: Counts) -> None:
-    """Age of the oldest spike below `age` (128 or less); -1 where there is none."""
-    kept, kept_old = _below(age), _below(age - 64)
-    for x in range(out.size):
-        recent, old = bits[0, x] & kept, bits[1, x] & kept_old
-        found = np.int64(highest(recent)) if recent else np.int64(-1)
-        out[x] = np.int64(64) + np.int64(highest(old)) if old else found
-
-
-@njit(cache=True, nogil=True, boundscheck=False, error_model="numpy")
-def _measure_open(bits: Words, before: Counts, newest: Counts, out: Counts) -> None:
-    """Frames of the interval from the newest spike to now: at least as long as that before it."""
-    for x in range(out.size):
-        age = newest[x] + 1
-        recent = bits[0, x] >> _Q(min(age, 63)) if age < 64 else _Q(0)
-        old = bits[1, x] >> _Q(min(max(age - 64, 0), 63)) if age < 128 else _Q(0)
-        found = np.int64(max(age, 64)) + np.int64(lowest(old)) if old else before[x]
-        found = age + np.int64(lowest(recent)) if recent else found
-        out[x] = max(age, found - newest[x])
-
-
-@njit(cache=True, nogil=True, boundscheck=False, error_model="numpy")
-def _count_between(bits: Words, first: Counts, stop: Counts, out: Counts) -> None:
-    """Spikes of ages first .. stop of every pixel, without `stop`."""
-    for x in range(out.size):
-        recent, old = _below(stop[x]) & ~_below(first[x]), _below(stop[x] - 64) & ~_below(first[x] - 64)
-        out[x] = np.int64(ones(bits[0, x] & recent) + ones(bits[1, x] & old))
-
-
-@njit(cache=True, nogil=True, boundscheck=False, error_model="numpy")
-def _paint(
-    all_bits: Words,
-    last_before: NDArray[np.int32],
-    seen: int,
-    look: int,
-    instants: Counts,
-    counts: Counts,
-    widths: Counts,
-    means: NDArray[np.float32],
-    last: NDArray[np.float32],
-    sums: NDArray[np.float32],
-    changed: NDArray[np.float32],
-    mapped_gain: NDArray[np.float32],
-    mapped_dark: NDArray[np.float32],
-    planes: NDArray[np.float32],
-) -> None:
-    """The planes (rows, columns, layers) of some rows, whose border is not painted."""
-    width = last_before.size // len(planes)
-    newest, still_open, older, younger = np.empty((4, width), np.int64)
-    rates = instants.size + counts.size + widths.size + 1
-    spikes, frames = np.ones((rates, width), np.int64), np.empty((rates, width), np.int64)
-    for row in range(len(planes)):
-        mine = slice(width * row, width * (row + 1))
-        bits, before = all_bits[:, mine], last_before[mine].astype(np.int64)
-        _find_older(bits, before, 0, newest)
-        _measure_open(bits, before, newest, still_open)
-        at = 0
-        for i in range(instants.size):
-            age = min(instants[i], seen)
-            _find_older(bits, before, age, older)
-            _find_younger(bits, age, younger)
-            for x in range(width):
-                frames[at, x] = older[x] - younger[x] if younger[x] >= 0 else still_open[x]
-            at += 1
-        for i in range(counts.size):
-            first = max(look - counts[i] // 2, 0)
-            stop = min(first + counts[i], max(seen, first + 1))
-            _count(bits, first, stop, spikes[at])
-            frames[at] = stop - first
-            at += 1
-        for i in range(widths.size + 1):
-            if i < widths.size:
-                _find_older(bits, before, min(look + widths[i], seen), older)
-                _find_younger(bits, max(look - widths[i], 0) + 1, younger)
-                for x in range(width):
-                    younger[x] = younger[x] if younger[x] >= 0 else newest[x]
-            else:
-                older[:], younger[:] = before, newest
-            _count_between(bits, younger, older, spikes[at])
-            for x in range(width):
-                whole = older[x] > younger[x]
-                frames[at, x] = older[x] - younger[x] if whole else still_open[x]
-                spikes[at, x] = spikes[at, x] if whole else 1
-            at += 1
-        _correct(
-            spikes, frames, means[:, mine], last[mine], sums[:, mine], changed[mine], mapped_gain[mine],
-            mapped_dark[mine], planes[row],
-        )  # fmt: skip
-
-
-@njit(cache=True, nogil=True, boundscheck=False, error_model="numpy")
-def _correct(
-    spikes: NDArray[np.int64],
-    frames: NDArray[np.int64],
-    means: NDArray[np.float32],
-    last: NDArray[np.float32],
-    sums: NDArray[np.float32],
-    changed: NDArray[np.float32],
-    mapped_gain: NDArray[np.float32],
-    mapped_dark: NDArray[np.float32],
-    planes: NDArray[np.float32],
-) -> None:
-    """Roots of rates, without the pixel's gain, and the planes about it, of a row: (pixels, layers)."""
-    one, zero, root_dark, prior = np.float32(1.0), np.float32(0.0), np.float32(DARK), np.float32(WINDOW_PRIOR)
-    width, counted, averaged = last.size, len(spikes), len(means)
-    gain, dark = np.empty(width, np.float32), np.zeros(width, np.float32)
-    for x in range(width):
-        gain[x] = min(max((sums[0, x] + prior) / (sums[1, x] + prior), np.float32(0.5)), np.float32(2.0))
-    if mapped_gain.size:
-        gain[:], dark[:] = mapped_gain, mapped_dark
-    root = np.empty((counted + averaged, width), np.float32)
-    for i in range(counted):
-        for x in range(width):
-            rate = np.float32(spikes[i, x]) / np.float32(frames[i, x])
-            root[i, x] = np.sqrt(max(rate - dark[x], zero) / gain[x] + root_dark)
-    for i in range(averaged):
-        for x in range(width):
-            root[counted + i, x] = np.sqrt(max(means[i, x] - dark[x], zero) / gain[x] + root_dark)
-    at = counted + averaged
-    for x in range(width):
-        for i in range(at):
-            planes[x, i] = root[i, x]
-        planes[x, at] = np.sqrt(last[x] + root_dark)
-        planes[x, at + 1] = np.float32(4.0) * (gain[x] - one)
-        planes[x, at + 2] = one if mapped_gain.size else changed[x] / (one + changed[x])
-
-
-@njit(cache=True, nogil=True, boundscheck=False, error_model="numpy")
-def _learn(
-    bits: Words,
-    picture: NDArray[np.float32],
-    last: NDArray[np.float32],
-    look: int,
-    frames: int,
-    of_last: np.float32,
-    kept: np.float32,
-    sums: NDArray[np.float32],
-    changed: NDArray[np.float32],
-) -> None:
-    """The sums for the gain, of the frames that the picture stands for, and how much the light has changed."""
-    one = np.float32(1.0)
-    counted = np.empty(picture.size, np.int64)
-    _count(bits, look, look + frames, counted)
-    for p in range(picture.size):
-        spikes = np.float32(counted[p])
-        mean = (one - of_last) * picture[p] + of_last * last[p]
-        sums[0, p] = kept * sums[0, p] + spikes
-        sums[1, p] = kept * sums[1, p] + np.float32(frames) * mean
-        change = abs(np.log((picture[p] + np.float32(DARK)) / (last[p] + np.float32(DARK))))
-        changed[p] = kept * changed[p] + min(change, one)

@@ -12,7 +12,8 @@ from torch import nn
 from denoiser.networks.dnss import DnSS
 from denoiser.networks.picture_network import HIDDEN, PICTURE_CHANNELS, PictureDnSS
 from denoiser.networks.stream_network import CARRY, CHANNELS, MOST_CHANNELS, StreamDnSS
-from denoiser.passes.pixel_history import CONDITIONS, DARK, MULTIPLE, PictureLayout
+from denoiser.passes.history_kernels import DARK
+from denoiser.passes.pixel_history import CONDITIONS, MULTIPLE, PictureLayout
 from denoiser.passes.window import WindowLayout
 from spikecam_env.checked import checked_whole
 from spikecam_env.errors import InputError, shown, unknown_name

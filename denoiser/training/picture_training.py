@@ -25,8 +25,8 @@ from numpy.typing import NDArray
 from torch import Tensor, nn
 
 from denoiser.ground.number_type import computing_in, number_type
+from denoiser.passes.history_kernels import DARK
 from denoiser.passes.pixel_history import (
-    DARK,
     HISTORY,
     TYPICAL_LOOK,
     TYPICAL_STEP,
@@ -293,7 +293,7 @@ class PictureLessons(TrainingSource):
         """
         device = self.streams.device
         inputs, lights = zip(*(played.next() for played in playing), strict=True)
-        planes = torch.from_numpy(np.stack([one.planes for one in inputs])).permute(0, 3, 1, 2).to(device)
+        planes = torch.from_numpy(np.stack([one.planes for one in inputs])).to(device)
         conditions = torch.from_numpy(np.stack([one.conditions for one in inputs])).to(device)
         light = torch.from_numpy(np.ascontiguousarray(np.stack(lights))).to(device)
         some = next((p.hidden for p in playing if p.hidden is not None), None)
@@ -336,7 +336,7 @@ class PictureLessons(TrainingSource):
                     continue
                 sums["network"] += float((picture.clamp(0, 1) - light).square().mean())
                 for name, plane in guesses.items():
-                    guess = seen.planes[..., plane] ** 2 - DARK
+                    guess = seen.planes[plane] ** 2 - DARK
                     sums[name] += float(np.mean((guess - light.cpu().numpy()[0, 0]) ** 2))
             for name, value in sums.items():
                 logs[name].append(math.log(max(value / ((FRAMES - passes) // TYPICAL_STEP), 1e-12) / peak**2))

@@ -8,8 +8,10 @@ import torch
 
 from denoiser import DenoiseObservation, OnlineDnSS
 from denoiser.many import ManyDnSS
+from denoiser.passes.fused_picture import prepared_picture
+from denoiser.passes.history_kernels import DARK
 from denoiser.passes.picture_pass import pictures_of
-from denoiser.passes.pixel_history import DARK, PictureLayout, PixelHistory
+from denoiser.passes.pixel_history import PictureLayout, PixelHistory
 from denoiser.passes.pixel_map import PixelMap
 from denoiser.passes.recipe import PictureRecipe
 from denoiser.weights import load_weights, pretrained_path, save_weights
@@ -35,8 +37,8 @@ def online(**options) -> OnlineDnSS:
 
 
 def rates_of(planes: np.ndarray) -> np.ndarray:
-    """(rates, H, W) of planes (H', W', layers)."""
-    return (planes[: SHAPE[0], : SHAPE[1], : LAYOUT.rates] ** 2 - DARK).transpose(2, 0, 1)
+    """(rates, H, W) of planes (layers, H', W')."""
+    return planes[: LAYOUT.rates, : SHAPE[0], : SHAPE[1]] ** 2 - DARK
 
 
 def rates_of_a_pixel(spikes: np.ndarray, look: int) -> list[float]:
@@ -84,15 +86,15 @@ def test_planes_are_those_of_the_law(frames: int, step: int, look: int) -> None:
     found = rates_of(last.planes)[: wanted.shape[-1]]
     assert last.start == seen - 1 - look
     np.testing.assert_allclose(found, wanted.transpose(2, 0, 1), atol=2e-7)
-    assert last.planes.shape == (8, 12, LAYOUT.layers)
-    np.testing.assert_array_equal(last.planes[6:, :, :], last.planes[[5, 5], :, :])
+    assert last.planes.shape == (LAYOUT.layers, 8, 12)
+    np.testing.assert_array_equal(last.planes[:, 6:], last.planes[:, [5, 5]])
 
 
 def test_a_spike_older_than_the_history_is_remembered_by_its_age() -> None:
     spikes = np.zeros((1200, 4, 4), np.uint8)
     spikes[99] = 1
     *_, last = PixelHistory(LAYOUT, (4, 4), step=400).push(spikes)
-    rate = last.planes[0, 0, HISTORY] ** 2 - DARK
+    rate = last.planes[HISTORY, 0, 0] ** 2 - DARK
     assert rate == pytest.approx(1 / 1101, rel=1e-3), "an interval that has lasted 1101 frames"
 
 
@@ -104,32 +106,30 @@ def test_the_gain_is_that_of_spikes_to_pictures_and_is_taken_out() -> None:
     for given in window.push(spikes):
         window.learn(given, np.full((1, 1, 4), 0.1, np.float32))
         last = given
-    gain = 1 + last.planes[0, :2, LAYOUT.rates] / 4
+    gain = 1 + last.planes[LAYOUT.rates, 0, :2] / 4
     print(f"gains {gain}")
     assert gain == pytest.approx([1.25, 1.0], abs=0.03)
-    rate = last.planes[0, :2, COUNT_40] ** 2 - DARK
+    rate = last.planes[COUNT_40, 0, :2] ** 2 - DARK
     assert rate * gain == pytest.approx([0.125, 0.1], rel=1e-3)
-    assert np.all(last.planes[0, :, LAYOUT.rates + 1] == 0), "nothing changed, so the gain may be texture"
+    assert np.all(last.planes[LAYOUT.rates + 1, 0] == 0), "nothing changed, so the gain may be texture"
 
 
 def test_a_calibration_map_is_taken_out_instead() -> None:
     unit = PixelMap(np.array([[0.8, 1.2]], np.float32), np.array([[0.0, 0.01]], np.float32))
     spikes = stream(40, (1, 2), seed=3) | np.eye(40, dtype=np.uint8)[::5].sum(0)[:, None, None].astype(np.uint8)
     plain, mapped = (next(PixelHistory(LAYOUT, (1, 2), u).push(spikes)).planes for u in (None, unit))
-    wanted = np.maximum(plain[0, :2, COUNT_40] ** 2 - DARK - unit.dark[0], 0) / unit.gain[0]
-    assert mapped[0, :2, COUNT_40] ** 2 - DARK == pytest.approx(wanted, rel=1e-5)
-    assert np.all(mapped[..., -1] == 1) and np.all(plain[..., -1] == 0)
+    wanted = np.maximum(plain[COUNT_40, 0, :2] ** 2 - DARK - unit.dark[0], 0) / unit.gain[0]
+    assert mapped[COUNT_40, 0, :2] ** 2 - DARK == pytest.approx(wanted, rel=1e-5)
+    assert np.all(mapped[-1] == 1) and np.all(plain[-1] == 0)
 
 
 def test_the_compiled_pass_gives_the_networks_own_pictures() -> None:
     network = load_weights("picture")[1]
     inputs = [list(PixelHistory(LAYOUT, (24, 20)).push(stream(80, (24, 20), seed)))[-1] for seed in (0, 1)]
-    both = pictures_of(network, inputs, [(), ()], (24, 20), torch.float32)
+    both = pictures_of(prepared_picture(network, torch.float32), inputs, [(), ()], (24, 20), torch.float32)
     for given, (picture, (hidden,)) in zip(inputs, both, strict=True):
         with torch.inference_mode():
-            rate, (kept,) = network(
-                torch.from_numpy(given.planes[None]).permute(0, 3, 1, 2), torch.from_numpy(given.conditions[None])
-            )
+            rate, (kept,) = network(torch.from_numpy(given.planes[None]), torch.from_numpy(given.conditions[None]))
         np.testing.assert_allclose(picture, rate[0].clamp(0, 1), atol=1e-5)
         np.testing.assert_allclose(hidden, kept[0], atol=1e-5)
 
