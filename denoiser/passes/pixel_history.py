@@ -345,7 +345,7 @@ def _below(age: int) -> Any:
 
 
 @njit(cache=True, nogil=True, boundscheck=False, error_model="numpy")
-def _count(bits: Words, first: int, stop: int, out: Counts) -> None:
+def _count(bits: Words, first: int, stop: int, out: Counts | NDArray[np.uint8]) -> None:
     """Spikes of ages first .. stop, without `stop` (128 or less)."""
     recent, old = _below(stop) & ~_below(first), _below(stop - 64) & ~_below(first - 64)
     for x in range(out.size):
