@@ -5,9 +5,9 @@
 One thread may fill the ring; another takes frames out of it into the window, and runs the passes that they complete.
 
     mode `picture`   takes in every frame and runs every pass: its memory is of the whole stream.  A third thread may
-                     run the passes, while frames of the next step are taken in (`run_passes_on`).  Frames that the
-                     ring overwrites before they were taken in are lost: those of the step before them make a picture,
-                     and the window begins anew.
+                     run the passes, while frames of the next step are taken in (`run_passes_on`).  Where frames are
+                     lost, or overwritten in the ring before they were taken in, those of the step before them make a
+                     picture, and the window begins anew.
     other modes      run the newest pass for a picture.  Frames too far before it are left out: the window then begins
                      anew HISTORY frames before it.
 
@@ -262,7 +262,8 @@ class LiveDnSS:
     def _catch_up(self, *, until_new: bool = False) -> None:
         """Take in the frames that have come, and none that come meanwhile, but for a pass whose frames were
         overwritten."""
-        self._collect()
+        if self._collect() and until_new:
+            return
         stop = self.count
         while (due := self._due(stop))[0] > self._taken:
             if not self._take(*due) and not self.takes_every_frame:
@@ -275,8 +276,10 @@ class LiveDnSS:
         window; begins anew where frames were lost, or are left out."""
         origin, _ = self.ring.extent
         if origin > self._origin:
-            self._collect(wait=True)
-            self._forget()
+            if not self.takes_every_frame:
+                self._forget()
+            elif self._running is None:
+                self._end()
             self._begin(origin)
         if self.takes_every_frame:
             reach = min(stop, self._taken + BLOCK)

@@ -40,7 +40,7 @@ from denoiser.ground.strips import share_rows
 from denoiser.passes.pixel_map import PixelMap
 from denoiser.passes.window import WINDOW_PRIOR, check_like
 from spikecam_env.compiled import njit
-from spikecam_env.streams.bits import as_words, by_pixel, highest, lowest, ones
+from spikecam_env.streams.bits import as_words, highest, lowest, ones, transpose
 from spikecam_env.streams.packing import pack_frames
 from spikecam_env.types import Pictures
 
@@ -315,22 +315,31 @@ def _advance(
 ) -> None:
     """Take n <= 64 frames into the history; words (n, pixels / 64) hold the newest first."""
     frames, pixels = words.shape[0], before.size
-    new, kept, rest = np.empty((64, 1), np.uint64), _Q(frames - 1), _Q(64 - frames)
+    kept, rest = _Q(frames - 1), _Q(64 - frames)
     share = np.float32(1.0) / np.float32(frames)
+    squares, new = np.zeros((64, LINE // WORD), np.uint64), np.empty(64, np.uint64)
     for column in range(words.shape[1]):
-        by_pixel(words, column, new)
+        lane = column % squares.shape[1]
+        if lane == 0:
+            side = min(squares.shape[1], words.shape[1] - column)
+            for f in range(64):
+                for i in range(side):
+                    squares[f, i] = words[f, column + i] if f < frames else _Q(0)
+            transpose(squares)
         first = 64 * column
         count = min(64, pixels - first)
+        for i in range(64):
+            new[i] = squares[i, lane]
         for i in range(count):  # no branch in it, so that the compiler does eight pixels at a time
             recent, old = bits[0, first + i], bits[1, first + i]
             leaving = old >> rest
             bits[1, first + i] = ((old << kept) << _ONE) | (recent >> rest)
-            bits[0, first + i] = ((recent << kept) << _ONE) | new[i, 0]
+            bits[0, first + i] = ((recent << kept) << _ONE) | new[i]
             aged = min(before[first + i] + np.int32(frames), np.int32(OLDEST))
             before[first + i] = np.int32(128) + np.int32(lowest(leaving)) if leaving else aged
         for m in range(shares.size):
             for i in range(count):
-                rate = np.float32(np.int64(ones(new[i, 0]))) * share
+                rate = np.float32(np.int64(ones(new[i]))) * share
                 means[m, first + i] += shares[m] * (rate - means[m, first + i])
 
 
