@@ -4,9 +4,10 @@
 
 One thread may fill the ring; another takes frames out of it into the window, and runs the passes that they complete.
 
-    mode `picture`   takes in every frame and runs every pass: its memory is of the whole stream.  Frames that the ring
-                     overwrites before they were taken in are lost: those of the step before them make a picture, and
-                     the window begins anew.
+    mode `picture`   takes in every frame and runs every pass: its memory is of the whole stream.  A third thread may
+                     run the passes, while frames of the next step are taken in (`run_passes_on`).  Where frames are
+                     lost, or overwritten in the ring before they were taken in, those of the step before them make a
+                     picture, and the window begins anew.
     other modes      run the newest pass for a picture.  Frames too far before it are left out: the window then begins
                      anew HISTORY frames before it.
 
@@ -17,9 +18,9 @@ pictures have the bits of `OnlineDnSS`; `spikecam bench live` prints the cost of
 from __future__ import annotations
 
 import os
-import time
 from collections.abc import Iterable
-from dataclasses import replace
+from concurrent.futures import Executor, Future
+from dataclasses import dataclass, replace
 from typing import Any, cast
 
 import numpy as np
@@ -28,12 +29,13 @@ from numpy.typing import NDArray
 from denoiser.live.ring import Ring
 from denoiser.passes.engine import AnyInput, Engine
 from denoiser.passes.infer import Carried
-from denoiser.passes.pixel_history import STEPS, PixelHistory
+from denoiser.passes.pixel_history import STEPS, WORD, PixelHistory
 from denoiser.passes.recipe import PictureRecipe
 from denoiser.weights import load_weights
 from spikecam_env.checked import checked_count, checked_shape, checked_whole
 from spikecam_env.errors import InputError, NotReadyError
 from spikecam_env.streams.packing import unpack_frames
+from spikecam_env.types import Pictures
 
 HISTORY = 64
 """Frames before a window that its running means hold at least, where there are so many.  More change a picture by less
@@ -46,6 +48,18 @@ BLOCK = 256
 """Frames that are taken out of the ring at a time, at most, in mode `picture`."""
 EXACT = 1 << 24
 """Frames after which the window of another mode begins anew: float32 holds no greater number exactly."""
+
+
+@dataclass(frozen=True)
+class _Pass:
+    """A pass that was run."""
+
+    window: AnyInput
+    """The network's input; its `start` is a frame of the stream."""
+    rates: Pictures
+    """(planes, H, W) [spikes/frame]."""
+    about: NDArray[np.uint8]
+    """Packed frames of the noisy picture."""
 
 
 class LiveDnSS:
@@ -76,12 +90,12 @@ class LiveDnSS:
     """Frames that are kept."""
     takes_every_frame: bool
     """Whether every frame is taken in and every pass is run, as in mode `picture`."""
-    window: AnyInput | None
-    """The network's input for the last picture; its `start` is a frame of the stream."""
-    rates: NDArray[np.float32] | None
-    """(planes, H, W) [spikes/frame], all frames of the last pass."""
+    _last: _Pass | None
+    _passes_on: Executor | None = None
+    _running: Future[_Pass] | None = None
     _origin: int  # frame at which the window begins
     _taken: int  # frame before which the window has all
+    _begun: int  # frame at which the step begins
     _next: int  # frame before which the next pass ends
     _is_new: bool  # whether there is a picture that was not asked for
 
@@ -136,12 +150,23 @@ class LiveDnSS:
         return max(self.room - waiting, 0)
 
     @property
+    def window(self) -> AnyInput | None:
+        """The network's input for the last picture; its `start` is a frame of the stream."""
+        return None if self._last is None else self._last.window
+
+    @property
+    def rates(self) -> Pictures | None:
+        """(planes, H, W) [spikes/frame], all frames of the last pass."""
+        return None if self._last is None else self._last.rates
+
+    @property
     def frame(self) -> int | None:
         """Frame of the stream in the last picture; None before the first."""
         return None if self.window is None else self.window.start + self._plane
 
     def reset(self) -> None:
         """Forget the stream."""
+        self._collect(wait=True)
         self.ring = Ring(self.shape, self.room)
         """Where frames are kept; a reader of files or sockets writes to it directly (`lend`, `took`)."""
         self.lost = 0
@@ -159,20 +184,23 @@ class LiveDnSS:
             if not self._taken:
                 self._begin(0)
 
-    def warm_up(self) -> float:
-        """Do the slow work of the first pictures now, such as to compile; forgets the stream.
+    def run_passes_on(self, executor: Executor | None) -> None:
+        """Mode `picture`: run the network there, one pass at a time, while `take_in` goes on with the frames that come.
 
-        Returns:
-            Time of a picture from a few frames [s].
+        Every frame is in the picture of its step, which has the same bits.  A step of `pace` lasts until the network
+        is free, 4000 frames at most; a step that the program gave is not lengthened: frames wait in the ring.
+        `picture` is then the newest that is finished.  None: passes are run by `take_in` and `picture` themselves.
         """
+        self._collect(wait=True)
+        self._passes_on = executor if self.takes_every_frame else None
+
+    def warm_up(self) -> None:
+        """Do the slow work of the first pictures now, such as to compile; forgets the stream."""
         for frames in (self._reach, min(self.step, self._reach)):  # the second goes on from the first
             self.ring.push(np.zeros((frames, self.ring.rows.shape[1]), np.uint8))
-            began = time.perf_counter()
             self.end()
             self.picture()
-            picture_s = time.perf_counter() - began
         self.reset()
-        return picture_s
 
     def push(self, packed: NDArray[np.uint8]) -> None:
         """(T, ceil(H W / 8)) uint8 more frames, packed as by `pack_frames`; InputError for another array."""
@@ -188,7 +216,9 @@ class LiveDnSS:
         Raises:
             NotReadyError: there are fewer frames than a pass needs.
         """
-        self._catch_up()
+        if self._passes_on is None or not self._is_new:
+            self._catch_up()
+            self._collect(wait=True)
         if self.rates is None:
             frames = self.count - self._origin
             raise NotReadyError(f"{frames} frames have come; the first picture needs {self.needed}, push more")
@@ -198,46 +228,64 @@ class LiveDnSS:
 
     def noisy(self) -> NDArray[np.float32]:
         """(H, W) float32, the mean [spikes/frame] of NOISY frames about `frame`, or of those before the pass's end."""
-        spikes = unpack_frames(self._about, self.shape).sum(axis=0, dtype=np.uint16)
-        return np.asarray(spikes / np.float32(len(self._about)))
+        assert self._last is not None
+        about = self._last.about
+        spikes = unpack_frames(about, self.shape).sum(axis=0, dtype=np.uint16)
+        return np.asarray(spikes / np.float32(len(about)))
 
     def ready(self) -> bool:
-        """Whether there are frames for a picture, and for another than the last."""
+        """Whether there are frames for a picture, and for another than the last; where passes are run on an executor,
+        whether one is finished."""
+        self._collect()
         origin, stop = self.ring.extent
-        return self._is_new or stop >= (origin + self.needed if origin > self._origin else self._next)
+        if self._is_new or self._passes_on is not None:
+            return self._is_new
+        return stop >= (origin + self.needed if origin > self._origin else self._next)
 
     def take_in(self) -> None:
         """Mode `picture`: do the work for the frames that have come, as `picture` does.  One of both has to be called
-        before `room` frames wait."""
+        before `room` frames wait.  Returns early where a pass on an executor is finished meanwhile."""
         if self.takes_every_frame:
-            self._catch_up()
+            self._catch_up(until_new=True)
 
     def end(self) -> None:
         """The stream is over: in mode `picture`, frames that do not fill a step make a picture, too."""
         self._catch_up()
         self._end()
+        self._collect(wait=True)
 
     def _end(self) -> None:
         if isinstance(self._window, PixelHistory):
+            self._collect(wait=True)
             self._run(self._window.end())
 
-    def _catch_up(self) -> None:
+    def _catch_up(self, *, until_new: bool = False) -> None:
         """Take in the frames that have come, and none that come meanwhile, but for a pass whose frames were
         overwritten."""
+        if self._collect() and until_new:
+            return
         stop = self.count
         while (due := self._due(stop))[0] > self._taken:
             if not self._take(*due) and not self.takes_every_frame:
                 stop = self.count
+            if self._collect() and until_new:
+                return
 
     def _due(self, stop: int) -> tuple[int, range]:
         """The frame up to which frames are to be taken in next, and the passes to run by their first frame in the
         window; begins anew where frames were lost, or are left out."""
         origin, _ = self.ring.extent
         if origin > self._origin:
-            self._forget()
+            if not self.takes_every_frame:
+                self._forget()
+            elif self._running is None:
+                self._end()
             self._begin(origin)
         if self.takes_every_frame:
-            return min(stop, self._taken + BLOCK, self._next), range(0)
+            reach = min(stop, self._taken + BLOCK)
+            while self._running is not None and self._next <= reach:
+                self._lengthen(reach)
+            return min(reach, self._next), range(0)
         newest = self._next + (stop - self._next) // self.step * self.step
         if newest < self._next:
             return self._taken, range(0)
@@ -267,30 +315,57 @@ class LiveDnSS:
         return True
 
     def _run(self, windows: Iterable[AnyInput]) -> None:
-        """Run the network for these windows, and keep the last and its rates."""
+        """Run the network for these windows."""
         for window in windows:
             frame = self._origin + window.start + self._plane
             stop = min(frame + min(self.latency, NOISY // 2) + 1, self._taken)
-            self._about = self.ring.packed(max(stop - NOISY, self._origin), stop)
-            ((self.rates, self._carried),) = self._engine.run([window], [self._carried], self.shape)
-            self._window.learn(cast("Any", window), self.rates)
-            self.window = replace(window, start=self._origin + window.start)
-            self._is_new = True
-            self._await_pass(self._taken + self.step)
+            about = self.ring.packed(max(stop - NOISY, self._origin), stop)
+            self._begun = self._taken
+            self._await_pass(self._begun + self.step)
+            if self._passes_on is None:
+                self._finish(self._passed(window, self._origin, about))
+            else:
+                self._running = self._passes_on.submit(self._passed, window, self._origin, about)
+
+    def _passed(self, window: AnyInput, origin: int, about: NDArray[np.uint8]) -> _Pass:
+        """A pass of the network; nothing that it changes is read while frames are taken in."""
+        ((rates, self._carried),) = self._engine.run([window], [self._carried], self.shape)
+        self._window.learn(cast("Any", window), rates)
+        return _Pass(replace(window, start=origin + window.start), rates, about)
+
+    def _finish(self, done: _Pass) -> None:
+        self._last, self._is_new = done, True
+
+    def _collect(self, *, wait: bool = False) -> bool:
+        """Take the running pass's picture, where it is finished, or once it is; whether there was one."""
+        if self._running is None or not (wait or self._running.done()):
+            return False
+        running, self._running = self._running, None
+        self._finish(running.result())
+        return True
+
+    def _lengthen(self, reach: int) -> None:
+        """The step's pass needs the picture of the running one: let the step go beyond frame `reach`, by whole words,
+        or wait for it."""
+        longest = self._begun + STEPS[1]
+        if self._has_own_step or self._next >= longest:
+            self._collect(wait=True)
+        else:
+            words = (reach - self._begun) // WORD + 1
+            self._await_pass(min(self._begun + words * WORD, longest))
 
     def _begin(self, frame: int) -> None:
         """Begin anew at a frame of the stream; gain and carried arrays stay."""
         self._window.begin_anew()
-        self._origin = self._taken = frame
+        self._origin = self._taken = self._begun = frame
         self._await_pass(frame + self.needed)
 
     def _forget(self) -> None:
         """There is no picture of the stream as it goes on."""
-        self.window = self.rates = None
-        self._is_new = False
+        self._last, self._is_new = None, False
 
     def _await_pass(self, stop: int) -> None:
         """The next pass ends before frame `stop`."""
         self._next = stop
         if isinstance(self._window, PixelHistory):
-            self._window.step = self.step
+            self._window.step = stop - self._begun

@@ -1,14 +1,20 @@
 """A stream taken in as it comes by one thread, and denoised picture by picture by another.
 
     source ──reader──▶ ring of LiveDnSS ──denoiser──▶ newest picture ──▶ screen, window or film
+                                            │   ▲
+                                         planes picture
+                                            ▼   │
+                                           network      mode `picture`: a third thread
 
 The reader takes a source that waits, a file, at the pace of a camera that sends it.  Frames that it has not taken
 BUFFER_S after they were due are lost, and counted; the last that a picture needs are taken, however late.  Other
 sources are read as fast as they bring frames, and wait where that is too slow.
 
-Mode `picture` takes every frame in between pictures.  A file's frames that the ring has no room for are lost; other
-sources wait.  Its pictures come `pictures` a second at the source's rate, or at that of its first picture where the
-source is slower than its camera.  When the source is over, the frames that do not fill a step make the last picture.
+Mode `picture` takes in every frame, those of the next step while the network is run.  Its pictures come `pictures` a
+second at the source's rate, or at that of its first picture where the source is slower than its camera.  Where the
+network takes longer, steps do: a picture is then of more frames, and none is lost.  A file's frames that the ring has
+no room for are lost; other sources wait.  When the source is over, the frames that do not fill a step make the last
+picture.
 """
 
 from __future__ import annotations
@@ -17,15 +23,19 @@ import threading
 import time
 from collections import deque
 from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import ExitStack
 from dataclasses import dataclass
 from types import TracebackType
 
 import numpy as np
+import torch
 from numpy.typing import NDArray
 
 from denoiser.live.online import LiveDnSS
 from spikecam_env.errors import InputError, NotReadyError
 from spikecam_env.streams.sources import Source
+from spikecam_env.torch_settings import torch_settings
 
 PICTURES_S = 30.0
 """Pictures a second; the eye sees them as motion."""
@@ -35,11 +45,6 @@ LEAVE_S = 0.5
 """For which a reader, or a watcher of the last picture, is waited for at the end [s]; either may never come back."""
 BLOCK = 256
 """Frames that are read at a time, at most."""
-FOR_PICTURES = 0.5
-"""Share of the time for the network, at most; the rest takes frames in."""
-SLOWER = 0.9
-"""Pictures a second, over those before, where frames wait in half of the ring, and more than at the picture before:
-longer steps cost less a frame."""
 TICK_S = 0.002
 """After which a thread looks again whether there is work [s]; at 40 kHz 80 frames come meanwhile."""
 
@@ -100,7 +105,8 @@ NOTHING = Figures(0.0, 0, 0, 0, 0.0)
 
 
 class Session:
-    """Takes a source in and denoises it inside its `with` block.  The denoiser forgets its stream.
+    """Takes a source in and denoises it inside its `with` block.  The denoiser forgets its stream.  In mode `picture`
+    torch has one thread less there, at least one: a processor is left to take frames in.
 
     `over` and `newest` raise the error of a thread, InputError for a stream that breaks.
 
@@ -141,14 +147,16 @@ class Session:
         self._error: BaseException | None = None
         self._arrivals: deque[tuple[int, float]] = deque(maxlen=4096)
         self._start_s = self._ended_s = 0.0
+        self._settings = ExitStack()
         self._taken = self._lost = self._pictures = 0
         self._latency_s = 0.0
-        self._free = live.room  # frames for which the ring had room when the last picture was made
 
     def __enter__(self) -> Session:
-        picture_s = self.live.warm_up()  # else frames would be lost meanwhile
-        if self._source.waits and self.live.takes_every_frame:
-            self._pictures_s = min(self._pictures_s, FOR_PICTURES / picture_s)
+        with ExitStack() as settings:
+            if self.live.takes_every_frame:
+                settings.enter_context(torch_settings(threads=max(1, torch.get_num_threads() - 1)))
+            self.live.warm_up()  # else frames would be lost meanwhile
+            self._settings = settings.pop_all()
         self.live.pace(self._frames_s, self._pictures_s)
         self._reader.start()
         self._denoiser.start()
@@ -161,6 +169,7 @@ class Session:
         if error is None:
             self._denoiser.join()
             self._reader.join(LEAVE_S)
+        self._settings.close()
 
     @property
     def over(self) -> bool:
@@ -234,6 +243,16 @@ class Session:
         self._arrivals.append((self.live.count, now))
 
     def _denoise(self) -> None:
+        with ThreadPoolExecutor(1, thread_name_prefix="spikecam-pass") as network:
+            self.live.run_passes_on(network)
+            try:
+                self._make_pictures()
+            finally:
+                self.live.run_passes_on(None)
+        with self._changed:  # whoever watches may be about to ask for the last
+            self._changed.wait_for(lambda: self._seen is self._shown or self._stop.is_set(), LEAVE_S)
+
+    def _make_pictures(self) -> None:
         due_s = 0.0
         while not self._is_time_up():
             period_s = 1.0 / self._pictures_s
@@ -249,8 +268,6 @@ class Session:
                 break
             else:
                 time.sleep(TICK_S)
-        with self._changed:  # whoever watches may be about to ask for the last
-            self._changed.wait_for(lambda: self._seen is self._shown or self._stop.is_set(), LEAVE_S)
 
     def _show(self) -> None:
         try:
@@ -259,11 +276,7 @@ class Session:
             return
         noisy, frame = self.live.noisy(), self.live.frame
         assert frame is not None
-        before, self._free = self._free, self.live.free
-        if self._source.waits and self._free < min(before, self.live.room // 2):
-            self._pictures_s *= SLOWER
-            self.live.pace(self._frames_s, self._pictures_s)
-        elif not self._source.waits and not self._pictures:
+        if not self._source.waits and not self._pictures:
             self.live.pace(min(self._frames_s, self.figures.frames_per_s), self._pictures_s)
         latency_s = time.perf_counter() - self._came_at(frame)
         self._latency_s += latency_s

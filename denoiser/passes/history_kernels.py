@@ -13,12 +13,15 @@ from numpy.typing import NDArray
 from denoiser.passes.window import WINDOW_PRIOR
 from spikecam_env.compiled import njit
 from spikecam_env.sensor.compiled_tools.intrinsics import use_widest_vectors
-from spikecam_env.streams.bits import by_pixel, highest, lowest, ones
+from spikecam_env.streams.bits import highest, lowest, ones, transpose
 
 OLDEST = 1 << 20
 """Greatest age of a spike [frames]: exact in float32."""
 DARK = 0.01
 """Rate that is added under a root or a logarithm [spikes/frame]; chosen here."""
+
+SIDE = 8
+"""Squares of 64 x 64 bits that are transposed side by side: words of a vector."""
 
 _Q = np.uint64
 _ALL = _Q(0xFFFFFFFFFFFFFFFF)
@@ -46,23 +49,37 @@ def advance(
     """
     use_widest_vectors()
     frames = words.shape[0]
-    new, kept, rest = np.empty((64, 1), np.uint64), _Q(frames - 1), _Q(64 - frames)
+    kept, rest = _Q(frames - 1), _Q(64 - frames)
     share = np.float32(1.0) / np.float32(frames)
+    squares, new = np.empty((64, SIDE), np.uint64), np.empty(64, np.uint64)
     for first in range(0, before.size, 64):
-        by_pixel(words, (first_pixel + first) // 64, new)
-        count = min(64, before.size - first)
-        for i in range(count):  # no branch in it, so that the compiler does eight pixels at a time
+        column, beside = (first_pixel + first) // 64, first // 64 % SIDE
+        if beside == 0:
+            _fill(words, column, squares)
+            transpose(squares)
+        new[:] = squares[:, beside]
+        pixels = min(64, before.size - first)
+        for i in range(pixels):  # no branch in it, so that the compiler does eight pixels at a time
             recent, old = recents[first + i], olds[first + i]
             leaving = old >> rest
             olds[first + i] = ((old << kept) << _ONE) | (recent >> rest)
-            recents[first + i] = ((recent << kept) << _ONE) | new[i, 0]
+            recents[first + i] = ((recent << kept) << _ONE) | new[i]
             aged = min(before[first + i] + np.int32(frames), np.int32(OLDEST))
             before[first + i] = np.int32(128) + np.int32(lowest(leaving)) if leaving else aged
         for m in range(shares.size):
-            mean = means[m, first_pixel + first : first_pixel + first + count]
-            for i in range(count):
-                rate = np.float32(np.int64(ones(new[i, 0]))) * share
+            mean = means[m, first_pixel + first : first_pixel + first + pixels]
+            for i in range(pixels):
+                rate = np.float32(np.int64(ones(new[i]))) * share
                 mean[i] += shares[m] * (rate - mean[i])
+
+
+@njit(cache=True, nogil=True, boundscheck=False, error_model="numpy")
+def _fill(words: NDArray[np.uint64], column: int, squares: NDArray[np.uint64]) -> None:
+    """Words (n, columns) from a column on as squares of bits side by side, zeros beyond."""
+    squares[:] = _Q(0)
+    for frame in range(words.shape[0]):
+        for i in range(min(squares.shape[1], words.shape[1] - column)):
+            squares[frame, i] = words[frame, column + i]
 
 
 @njit(cache=True, nogil=True, boundscheck=False, error_model="numpy")
@@ -73,7 +90,7 @@ def _below(age: int) -> Any:
 
 
 @njit(cache=True, nogil=True, boundscheck=False, error_model="numpy")
-def _count(recents: Words, olds: Words, first: int, stop: int, out: Counts) -> None:
+def count(recents: Words, olds: Words, first: int, stop: int, out: Counts | NDArray[np.uint8]) -> None:
     """Spikes of ages first .. stop, without `stop` (128 or less)."""
     recent, old = _below(stop) & ~_below(first), _below(stop - 64) & ~_below(first - 64)
     for x in range(out.size):
@@ -164,7 +181,7 @@ def paint(
         for i in range(counts.size):
             first = max(look - counts[i] // 2, 0)
             end = min(first + counts[i], max(seen, first + 1))
-            _count(recents, olds, first, end, spikes[at])
+            count(recents, olds, first, end, spikes[at])
             frames[at] = end - first
             at += 1
         for i in range(widths.size + 1):
@@ -175,12 +192,12 @@ def paint(
                     younger[x] = younger[x] if younger[x] >= 0 else newest[x]
             else:
                 older[:], younger[:] = before, newest
-            count, length = spikes[at], frames[at]
-            _count_between(recents, olds, younger, older, count)
+            fired, length = spikes[at], frames[at]
+            _count_between(recents, olds, younger, older, fired)
             for x in range(width):
                 whole = older[x] > younger[x]
                 length[x] = older[x] - younger[x] if whole else still_open[x]
-                count[x] = count[x] if whole else 1
+                fired[x] = fired[x] if whole else 1
             at += 1
         known = mapped_gain.size > 0
         if known:
@@ -240,11 +257,9 @@ def _paint_about(
 
 @njit(cache=True, nogil=True, boundscheck=False, error_model="numpy")
 def learn(
-    recents: Words,
-    olds: Words,
+    spikes: NDArray[np.uint8],
     picture: Floats,
     last: Floats,
-    look: int,
     frames: int,
     of_last: np.float32,
     kept: np.float32,
@@ -254,11 +269,9 @@ def learn(
 ) -> None:
     """The sums for the gain, of the frames that the picture stands for, and how much the light has changed."""
     one = np.float32(1.0)
-    counted = np.empty(picture.size, np.int64)
-    _count(recents, olds, look, look + frames, counted)
     for p in range(picture.size):
         mean = (one - of_last) * picture[p] + of_last * last[p]
-        sum_of_spikes[p] = kept * sum_of_spikes[p] + np.float32(counted[p])
+        sum_of_spikes[p] = kept * sum_of_spikes[p] + np.float32(spikes[p])
         sum_of_pictures[p] = kept * sum_of_pictures[p] + np.float32(frames) * mean
         change = abs(np.log((picture[p] + np.float32(DARK)) / (last[p] + np.float32(DARK))))
         changed[p] = kept * changed[p] + min(change, one)

@@ -37,7 +37,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from denoiser.ground.strips import share_rows
-from denoiser.passes.history_kernels import advance, learn, paint
+from denoiser.passes.history_kernels import advance, count, learn, paint
 from denoiser.passes.pixel_map import PixelMap
 from denoiser.passes.window import check_like
 from spikecam_env.streams.bits import as_words
@@ -111,6 +111,12 @@ class PictureInput:
     """(layers, H', W'), H' and W' extended to a multiple of MULTIPLE."""
     conditions: NDArray[np.float32]
     """(CONDITIONS,)."""
+    step: int
+    """Frames since the pass before."""
+    frames: int
+    """Of them those for which the picture stands, from its own back."""
+    spikes: NDArray[np.uint8]
+    """(H W,) in those, for the gain: the history goes on before the picture is known."""
 
     count = 1
 
@@ -147,7 +153,6 @@ class PixelHistory:
         self._last = np.zeros(pixels, np.float32)  # the last picture
         self._pictures = 0
         self._in_step = 0  # frames since the last pass
-        self._stood_for = 0  # frames of the last pass
         self._held = np.empty((0, -(-pixels // 8)), np.uint8)  # packed frames that do not fill a word yet
 
     @property
@@ -175,16 +180,17 @@ class PixelHistory:
             yield self._input()
 
     def learn(self, window: PictureInput, rates: Pictures) -> None:
-        """Take in the picture (1, H, W) of a pass, for the gain of later ones, and as their last picture."""
+        """Take in the picture (1, H, W) of a pass, for the gain of later ones, and as their last picture.
+
+        More frames may have been pushed since, and may be by another thread meanwhile, but not those of the next pass.
+        """
         picture = np.ascontiguousarray(rates, np.float32).reshape(-1)
-        look = self.seen - 1 - window.start
-        frames = min(self._stood_for, HISTORY - look)
-        kept = np.float32((1 - 1 / self.layout.gain_memory) ** frames)
-        of_last = np.float32(frames / (2 * self._stood_for) if self._pictures else 0.0)
+        kept = np.float32((1 - 1 / self.layout.gain_memory) ** window.frames)
+        of_last = np.float32(window.frames / (2 * window.step) if self._pictures else 0.0)
 
         def learned(pixels: slice) -> None:
             learn(
-                *self._bits[:, pixels], picture[pixels], self._last[pixels], look, frames, of_last, kept,
+                window.spikes[pixels], picture[pixels], self._last[pixels], window.frames, of_last, kept,
                 *self._sums[:, pixels], self._changed[pixels],
             )  # fmt: skip
 
@@ -237,9 +243,10 @@ class PixelHistory:
         self._in_step += frames
 
     def _input(self) -> PictureInput:
-        self._stood_for, self._in_step = self._in_step, 0
+        step, self._in_step = self._in_step, 0
         layout = self.layout
         look = min(self.look, self.seen - 1)
+        frames = min(step, HISTORY - look)
         height, width = self.shape
         planes = np.empty((layout.layers, height + -height % MULTIPLE, width + -width % MULTIPLE), np.float32)
         instants = np.clip(look + np.asarray(layout.instants), 0, HISTORY - 1)
@@ -248,18 +255,21 @@ class PixelHistory:
         nothing = np.zeros(0, np.float32)
         gain, dark = (nothing, nothing) if self.unit is None else (self.unit.gain.ravel(), self.unit.dark.ravel())
         means = self._means * weights
+        spikes = np.empty(height * width, np.uint8)
 
         def painted(_: int, rows: slice) -> None:
             paint(
                 rows.start, rows.stop, width, *self._bits, self._before, self.seen, look, instants, counts, widths,
                 means, self._last, *self._sums, self._changed, gain, dark, planes,
             )  # fmt: skip
+            of_rows = slice(width * rows.start, width * rows.stop)
+            count(*self._bits[:, of_rows], look, look + frames, spikes[of_rows])
 
         share_rows(painted, 1, height, planes.size)
         planes[:, :height, width:] = planes[:, :height, width - 1 : width]
         planes[:, height:] = planes[:, height - 1 : height]
-        conditions = conditions_of(self._stood_for, look, self.seen, mapped=self.unit is not None)
-        return PictureInput(self.seen - 1 - look, planes, conditions)
+        conditions = conditions_of(step, look, self.seen, mapped=self.unit is not None)
+        return PictureInput(self.seen - 1 - look, planes, conditions, step, frames, spikes)
 
     def _share(self, work: Callable[[slice], None]) -> None:
         """Call work(pixels) for runs of pixels, on as many threads as pay."""
@@ -270,7 +280,7 @@ class PixelHistory:
         )
 
 
-_NUMBERS = ("seen", "_pictures", "_in_step", "_stood_for")
+_NUMBERS = ("seen", "_pictures", "_in_step")
 _ARRAYS = ("bits", "before", "means", "sums", "changed", "last", "held")
 
 

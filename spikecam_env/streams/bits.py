@@ -56,32 +56,35 @@ def as_words(packed: NDArray[np.uint8]) -> NDArray[np.uint64]:
 
 
 @njit(cache=True, nogil=True, boundscheck=False)
-def transpose(square: NDArray[np.uint64]) -> None:
-    """Transpose (64,) words of 64 bits in place: bit i of word j becomes bit j of word i."""
+def transpose(squares: NDArray[np.uint64]) -> None:
+    """Transpose squares of bits side by side, (64, n) words, in place: bit i of word j becomes bit j of word i."""
+    words = squares.reshape(-1)
     width, mask = 32, _Q(0x00000000FFFFFFFF)
     while width:
-        shift = _Q(width)
-        for half in range(0, 64, 2 * width):
-            for i in range(half, half + width):
-                t = ((square[i] >> shift) ^ square[i + width]) & mask
-                square[i] ^= t << shift
-                square[i + width] ^= t
+        run = width * squares.shape[1]
+        for first in range(0, words.size, 2 * run):
+            _exchange(words[first : first + run], words[first + run : first + 2 * run], _Q(width), mask)
         width >>= 1
         mask ^= mask << _Q(width)
+
+
+@njit(cache=True, nogil=True, boundscheck=False)
+def _exchange(upper: NDArray[np.uint64], lower: NDArray[np.uint64], shift: np.uint64, mask: np.uint64) -> None:
+    """Exchange the bits of `upper` above a mask with those of `lower` in it: one loop over words that lie side by side,
+    so that the compiler does eight at a time."""
+    for i in range(upper.size):
+        t = ((upper[i] >> shift) ^ lower[i]) & mask
+        lower[i] ^= t
+        upper[i] ^= t << shift
 
 
 @njit(cache=True, nogil=True, boundscheck=False)
 def by_pixel(words: NDArray[np.uint64], column: int, out: NDArray[np.uint64]) -> None:
     """The 64 pixels of a column of words (F, n): out (64, ceil(F / 64)), frame f is bit f % 64 of word f // 64."""
     frames = words.shape[0]
-    square = np.empty(64, np.uint64)
-    for block in range(out.shape[1]):
-        first = 64 * block
-        for f in range(64):
-            square[f] = words[first + f, column] if first + f < frames else _Q(0)
-        transpose(square)
-        for p in range(64):
-            out[p, block] = square[p]
+    for f in range(64 * out.shape[1]):
+        out[f % 64, f // 64] = words[f, column] if f < frames else _Q(0)
+    transpose(out)
 
 
 @njit(cache=True, nogil=True, boundscheck=False)

@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import threading
 import time
+from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 import pytest
 
 from denoiser.live import LiveDnSS
 from denoiser.online import OnlineDnSS
+from denoiser.passes.pixel_history import PictureLayout, PixelHistory
 from denoiser.passes.recipe import RECIPES, recipe_of
 from denoiser.passes.window import RollingWindow
 from spikecam_env.errors import InputError, NotReadyError
@@ -247,6 +249,76 @@ def test_a_new_pace_holds_from_the_next_picture_on() -> None:
             watching.picture()
             frames.append(watching.frame + watching.latency + 1)
     assert frames == [40, 50, 60, 70, 80, 90, 100, 110, 120]
+
+
+def slowly(watching: LiveDnSS, seconds: float) -> None:
+    """Its network takes as long as that."""
+    run = watching._engine.run
+
+    def delayed(*given: object) -> object:
+        time.sleep(seconds)
+        return run(*given)
+
+    object.__setattr__(watching._engine, "run", delayed)
+
+
+@pytest.mark.parametrize("step", [40, 333])
+def test_passes_on_a_thread_give_the_same_bits_while_frames_go_on(step: int) -> None:
+    """Each pass is delayed until the frames of the next have come: a step that was given waits, and stays the same."""
+    spikes, watching = stream(2400), live("picture", step=step)
+    pictures, shown = online("picture", step=step).push(spikes), {}
+    slowly(watching, 0.005)
+    with ThreadPoolExecutor(1) as passes:
+        watching.run_passes_on(passes)
+        for first in range(0, 2400, 31):
+            watching.push(pack_frames(spikes[first : first + 31]))
+            watching.take_in()
+            if watching.ready():
+                picture = watching.picture()
+                shown[(watching.frame + watching.latency + 1) // step] = picture
+        watching.run_passes_on(None)
+        shown[2400 // step] = watching.picture()
+    assert len(shown) > 2 and watching.lost == 0
+    for number, picture in shown.items():
+        np.testing.assert_array_equal(picture, pictures[number - 1])
+
+
+def test_a_slow_network_makes_paced_steps_longer_and_every_frame_is_in_a_picture() -> None:
+    """Pictures are those of the denoiser of the whole stream whose steps end where these did."""
+    spikes, watching = stream(3000), live("picture")
+    watching.pace(4000, 50)  # 80 frames a step, if the network were fast enough
+    slowly(watching, 0.02)
+    ends, shown = [], []
+    with ThreadPoolExecutor(1) as passes:
+        watching.run_passes_on(passes)
+        for first in range(0, 3000, 50):
+            watching.push(pack_frames(spikes[first : first + 50]))
+            watching.take_in()
+            time.sleep(0.002)
+            if watching.ready():
+                shown.append(watching.picture())
+                ends.append(watching.frame + watching.latency + 1)
+        watching.run_passes_on(None)
+    steps = np.diff([0, *ends])
+    print(f"steps of {steps} frames")
+    assert steps[0] == 80 and max(steps) > 200 and watching.lost == 0
+    history, engine, carried = PixelHistory(PictureLayout(), SHAPE), live("picture")._engine, ()
+    for begin, stop, picture in zip([0, *ends], ends, shown, strict=False):
+        history.step = stop - begin
+        (window,) = history.push(spikes[begin:stop])
+        ((rates, carried),) = engine.run([window], [carried], SHAPE)
+        history.learn(window, rates)
+        np.testing.assert_array_equal(picture, rates[0])
+
+
+def test_frames_before_a_gap_make_a_picture_of_mode_picture() -> None:
+    spikes, watching = stream(90), live("picture", step=500)
+    watching.push(pack_frames(spikes))
+    watching.take_in()
+    watching.skip(1000)
+    (picture,) = online("picture", step=90).push(spikes)
+    np.testing.assert_array_equal(watching.picture(), picture)
+    assert watching.frame == 90 - 1 - watching.latency and watching.count == 1090
 
 
 @pytest.mark.parametrize(("mode", "ahead"), [("picture", 12), ("best", 20), ("paper", 20)])

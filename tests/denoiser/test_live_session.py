@@ -7,6 +7,7 @@ import time
 
 import numpy as np
 import pytest
+import torch
 
 from denoiser.live import LiveDnSS
 from denoiser.live.session import NOTHING, Figures, Session
@@ -178,6 +179,39 @@ def test_a_sender_waits_for_mode_picture_so_that_nothing_is_lost() -> None:
         watched(session)
     assert (session.figures.frames, session.figures.lost) == (6000, 0)
     assert small.count == 6000 and small.frame == 6000 - 1 - small.latency
+
+
+def test_a_source_that_stalls_and_a_slow_network_lose_no_frame(
+    every: LiveDnSS, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The network takes a quarter of a second, in which 500 frames come; steps would be of 100, and become longer."""
+    monkeypatch.setattr("denoiser.live.session.BUFFER_S", 10.0)
+    run = every._engine.run
+
+    def delayed(*given: object) -> object:
+        time.sleep(0.25)
+        return run(*given)
+
+    with Session(MadeUp(4000, stall_s=0.5), every, pictures=20.0) as session:
+        object.__setattr__(every._engine, "run", delayed)
+        seen = watched(session)
+    steps = np.diff([shown.frame for shown in seen])
+    print(f"{session.figures}; steps of {steps} frames")
+    assert (session.figures.frames, session.figures.lost) == (4000, 0)
+    assert every.step == 100 and max(steps) > 300
+    assert seen[-1].frame == 4000 - 1 - every.latency
+
+
+def test_torch_has_its_threads_again_after_a_session(every: LiveDnSS) -> None:
+    before = torch.get_num_threads()
+    try:
+        torch.set_num_threads(3)
+        with Session(MadeUp(100), every) as session:
+            assert torch.get_num_threads() == 2, "one thread is left to take frames in"
+            watched(session)
+        assert torch.get_num_threads() == 3
+    finally:
+        torch.set_num_threads(before)
 
 
 def test_a_source_slower_than_its_camera_gets_shorter_steps(every: LiveDnSS) -> None:
