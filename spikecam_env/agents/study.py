@@ -22,7 +22,7 @@ from spikecam_env.agents.playing import Actor, episodes_along, episodes_of, scor
 from spikecam_env.agents.ppo import PPO
 from spikecam_env.agents.tracker import Tracker
 from spikecam_env.agents.training import SIGHTS, Study, agents_along, learner, train_agent
-from spikecam_env.checked import checked_number
+from spikecam_env.checked import checked_count, checked_number
 from spikecam_env.envs.tasks import TASKS
 from spikecam_env.errors import InputError, unknown_name
 from spikecam_env.pool import spread
@@ -137,13 +137,15 @@ def cases(
         imitate: learn from the oracle (`agents.ppo`).
 
     Raises:
-        InputError: for an unknown task, sight or shipped agent, and for intervals out of range.
+        InputError: for an unknown task, sight or shipped agent, and for steps and intervals out of range.
     """
     for task in tasks:
         Study(task)  # refuses unknown names
     for sight in sights:
         if sight not in (*SIGHTS, *READY):
             raise unknown_name("observation", sight, (*SIGHTS, *READY))
+    for length in steps:
+        checked_count(length, "steps")
     for interval in (*intervals, *(trained or ())):
         checked_number(interval, "interval", 1.0, unit="frames")
     if trained is not None and trained[0] > trained[1]:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 import tyro
 
 from spikecam_env.cli.options import Size
-from spikecam_env.numbers import Count, WholeRange, Workers
+from spikecam_env.numbers import WholeRange, Workers
 
 if TYPE_CHECKING:
     from spikecam_env.agents.study import Result, StudyRun
@@ -45,8 +45,9 @@ class Agents:
         "tracker",
     )
     """Observations: tfp, tfi, spikes, rate (denoised), dim_rate (the same, brighter), clean (no noise), root_tfp,
-    root_rate and root_clean (on a root scale, for the dark), frame30, frame1000.  Without training: tracker (classical, sees tfp), tracker-rate, tracker-clean; shipped (the task's
-    shipped agent, trained on tfp, sees it), shipped-rate, shipped-clean."""
+    root_rate and root_clean (on a root scale, for the dark), frame30, frame1000.  Without training: tracker (classical,
+    sees tfp), tracker-rate, tracker-clean; shipped (the task's shipped agent, trained on tfp, sees it), shipped-rate,
+    shipped-clean."""
     intervals: tuple[float, ...] = ()
     """Mean intervals [frames] at which each task is played, each a row, and learned.  Default: the task's own light."""
     trained: tuple[float, float] | None = None
@@ -59,7 +60,7 @@ class Agents:
     """Trainings of each task and observation, with different seeds."""
     first_seed: Annotated[int, WholeRange(0, 10**9)] = 0
     """The first of these seeds; the others follow it."""
-    steps: tuple[Count, ...] = ()
+    steps: tuple[int, ...] = ()
     """Training steps; several are trainings of their own, each a row.  Default: as many as the shipped agents had."""
     episodes: Annotated[int, WholeRange(1, MOST_EPISODES)] | None = None
     """Test episodes that make up a score.  Default: 100 of Catch, 50 of Saccade, 10 of Track."""

@@ -2,8 +2,8 @@
 
     picture = 255 * (spikes in the last `window` frames / frames seen of them)^gamma       [spikes/frame]
 
-Smooth; blurs motion within the window.  Source: Zhu et al., ICME 2019 (`streams.pictures`).  The root, gamma = 1/2, gives
-counts of all lights one noise.  Source: Anscombe, Biometrika 35 (1948).
+Smooth; blurs motion within the window.  Source: Zhu et al., ICME 2019 (`streams.pictures`).  The root, gamma = 1/2,
+gives counts of all lights the same noise.  Source: Anscombe, Biometrika 35 (1948).
 """
 
 from __future__ import annotations
@@ -42,7 +42,8 @@ class TFP(Observation):
     """(1, H, W) uint8: 255 where a pixel fires in every frame.
 
     Raises:
-        InputError: for a gamma that is not above 0 and at most 1, a window below 1, and on a device for one longer than the step's own block.
+        InputError: for a gamma that is not above 0 and at most 1, a window below 1, and on a device for a window
+            longer than the step's own block.
     """
 
     window: int | None = None

@@ -82,8 +82,8 @@ class Task:
     success_side: float = 1 / 8
     """Distance from the middle below which the target counts as looked at [shorter sides]."""
     mean_interval: tuple[float, float] | None = None
-    """Shortest and longest mean interval of an episode [frames], drawn evenly in its logarithm; None is the light of the
-    textures."""
+    """Shortest and longest mean interval of an episode [frames], drawn evenly in its logarithm; None is the light
+    of the textures."""
 
     frames_per_step: ClassVar[int] = 40
     """Frames from action to action."""
