@@ -7,6 +7,7 @@ are lines of a record, so that a study goes on where it was stopped.
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
+from contextlib import closing
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
@@ -27,6 +28,7 @@ from spikecam_env.envs.tasks import TASKS
 from spikecam_env.errors import InputError, unknown_name
 from spikecam_env.pool import spread
 from spikecam_env.run_folder import run_folder
+from spikecam_env.torch_settings import torch_settings
 from spikecam_env.untrusted import Count, Declared, Name, Positive, Seed, Side, Whole, declared, parse_json, read_text
 from spikecam_env.whole import write_text_whole
 
@@ -197,12 +199,13 @@ def _curve(case: StudyRun, out: Path, points: int) -> tuple[dict[str, float], ..
 
 
 def _played(case: StudyRun, curve: tuple[dict[str, float], ...], out: Path) -> Result:
-    env, episodes = case.played.make(split="test"), case.episodes or episodes_of(case.task)
-    try:
+    episodes = case.episodes or episodes_of(case.task)
+    with (
+        closing(case.played.make(split="test")) as env,
+        torch_settings(threads=1),  # more pay for no network here, and where others work too they wait for each other
+    ):
         score = score_of(actor_of(case, out, env), env, episodes)
         along = _along(case, env, episodes_along(episodes), out)
-    finally:
-        env.close()
     return Result(case=case, score=score, cpu_s=curve[-1]["cpu_s"] if curve else 0.0, curve=curve, along=along)
 
 
