@@ -32,7 +32,7 @@ class Agents:
     """
 
     out: Path
-    """Folder for record.jsonl, a line a run; agents.txt, the table; curves.png; with --intervals, light.txt and
+    """Folder for record.jsonl, a line a run; agents.txt, the table; curves.png; with --intervals, light.md and
     light.png, scores over light; and every run's agent."""
     tasks: Annotated[tuple[str, ...], tyro.conf.arg(metavar="ID...")] = ("Track-v1", "Catch-v1", "Saccade-v1")
     """Ids, with or without `spikecam_env/`."""
@@ -106,14 +106,18 @@ class Agents:
         """Print and write the tables, and give the names of their files."""
         from spikecam_env.agents.over_light import light_rows
         from spikecam_env.agents.study import summary
-        from spikecam_env.cli.table import table
+        from spikecam_env.cli.table import markdown, table
         from spikecam_env.whole import write_text_whole
 
-        tables = {"agents.txt": summary(results)} | ({"light.txt": light_rows(results)} if self.intervals else {})
-        for name, rows in tables.items():
-            write_text_whole(self.out / name, table(rows) + "\n")
-            print(table(rows), end="\n\n" if len(tables) > 1 else "\n")
-        return [*tables]
+        rows = summary(results)
+        write_text_whole(self.out / "agents.txt", table(rows) + "\n")
+        print(table(rows))
+        if not self.intervals:
+            return ["agents.txt"]
+        over_light = light_rows(results)
+        write_text_whole(self.out / "light.md", markdown(over_light) + "\n")
+        print("\n" + table(over_light))
+        return ["agents.txt", "light.md"]
 
     def _film(self, played: list[StudyRun]) -> None:
         from spikecam_env.agents.report import pictures

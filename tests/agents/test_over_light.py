@@ -87,4 +87,9 @@ def test_a_study_over_light_writes_its_table_and_picture_and_goes_on(tmp_path: P
     assert command(line) == 0
     first = capsys.readouterr().out
     assert command(line) == 0 and capsys.readouterr().out == first
-    assert (tmp_path / "light.txt").read_text() in first and (tmp_path / "light.png").stat().st_size > 1000
+    figures = (tmp_path / "light.md").read_text()
+    rows = [[cell.strip() for cell in row.strip("|").split("|")] for row in figures.splitlines()]
+    assert rows[0][2:5] == ["interval [frames]", "root_tfp", "tracker"] and len({len(row) for row in rows}) == 1
+    assert [row[2] for row in rows[2:]] == ["20", "50", "20", "50"], "trained agents, then those that learn nothing"
+    assert all(cell in first for row in rows[2:] for cell in row)
+    assert (tmp_path / "light.png").stat().st_size > 1000
