@@ -1,6 +1,6 @@
 """The denoised picture as an observation: the newest rate plane that the denoiser has finished.
 
-    picture = 255 * rate / `white`      rate: [spikes/frame], of a frame that is `age` frames old
+    picture = 255 * (rate / `white`)^gamma      rate: [spikes/frame], of a frame that is `age` frames old
 
 By default that is the picture of mode `picture`, one a step, at a small share of the cost of other modes; its age is 12
 frames.
@@ -27,7 +27,7 @@ from denoiser.passes.pixel_history import STEPS
 from denoiser.passes.recipe import MODES, PictureRecipe
 from denoiser.weights import load_weights
 from spikecam_env.checked import checked_number
-from spikecam_env.envs.observations.protocol import Blocks, CameraView, Observation, grey, picture_space
+from spikecam_env.envs.observations.protocol import Blocks, CameraView, Observation, checked_gamma, grey, picture_space
 from spikecam_env.types import Masks
 
 
@@ -36,19 +36,23 @@ class Rate(Observation):
     """(1, H, W) uint8: 255 where the denoised rate is `white` or above.
 
     Raises:
-        InputError: `white` is not above 0; or, when an episode begins, the mode is unknown or its checkpoint unusable.
+        InputError: `white` is not above 0, or gamma not above 0 and at most 1; or, when an episode begins, the mode is
+            unknown or its checkpoint unusable.
     """
 
     mode: str | os.PathLike[str] | None = None
     """"picture", "best", "fast", "paper", or the path of a checkpoint (.pt); default: "picture", on a device "best"."""
     white: float = field(default=1.0, kw_only=True)
-    """[spikes/frame]; eight bits round a rate below a 500th of it to 0."""
+    """[spikes/frame]; eight bits round a rate below a 500th of it to 0 (gamma 1)."""
+    gamma: float = field(default=1.0, kw_only=True)
+    """Exponent of the picture's law: at 0.5, a root, eight bits hold rates from a 260 000th of `white` on."""
 
     takes_tensors = True
     begins_alone = False  # on a device the windows of all streams lie in one memory
 
     def __post_init__(self) -> None:
         checked_number(self.white, "white", 0.0, above=True)
+        checked_gamma(self.gamma)
 
     def space(self, view: CameraView) -> spaces.Box:
         return picture_space(view)
@@ -56,13 +60,17 @@ class Rate(Observation):
     def start(self, view: CameraView, streams: int) -> Denoising:
         if view.device is not None:
             online = _denoiser("best" if self.mode is None else self.mode, device=str(view.device))
-            return DenoisingOnDevice(ManyDnSS(online, streams, view.shape), self.white, view.device)
+            return DenoisingOnDevice(ManyDnSS(online, streams, view.shape), self._shown, view.device)
         online = _denoiser("picture" if self.mode is None else self.mode, step=_step(view.frames_per_step))
-        return Denoising(ManyDnSS(online, streams, view.shape), self.white)
+        return Denoising(ManyDnSS(online, streams, view.shape), self._shown)
 
     def step(self, blocks: Blocks, state: Denoising) -> tuple[NDArray[np.uint8], Denoising]:
         spikes: Any = blocks.spikes
         return state.seen(spikes.view(np.uint8) if isinstance(spikes, np.ndarray) else spikes), state
+
+    def _shown(self, rate: Any) -> Any:
+        """The picture of a rate [spikes/frame]."""
+        return grey(rate / self.white, self.gamma)
 
     def age(self, state: Denoising) -> NDArray[np.float64]:
         return np.where(state.finished > 0, state.pushed - state.finished, -1.0)
@@ -72,9 +80,9 @@ class Denoising:
     """Streams mid-way.  The denoiser's memory is large and changed in place: no step can be taken again from the state
     before."""
 
-    def __init__(self, denoiser: ManyDnSS, white: float) -> None:
+    def __init__(self, denoiser: ManyDnSS, shown: Callable[[Any], Any]) -> None:
         streams, shape = len(denoiser), denoiser.shape
-        self._denoiser, self._white = denoiser, white
+        self._denoiser, self._shown = denoiser, shown
         self._fired: Any = np.zeros((streams, *shape), np.int64)
         self._picture: Any = np.zeros((streams, 1, *shape), np.uint8)
         self.pushed = np.zeros(streams, np.int64)
@@ -109,16 +117,16 @@ class Denoising:
         self._fired += spikes.sum(axis=1, dtype=np.int64)
         for stream, rates in enumerate(self._denoiser.push(spikes)):
             if len(rates):
-                self._picture[stream, 0] = grey(rates[-1] / self._white)
-        noisy = grey(self._fired / (self._white * np.maximum(self.pushed, 1)[:, None, None]))[:, None]
+                self._picture[stream, 0] = self._shown(rates[-1])
+        noisy = self._shown(self._fired / np.maximum(self.pushed, 1)[:, None, None])[:, None]
         return np.where((self.finished > 0)[:, None, None, None], self._picture, noisy)
 
 
 class DenoisingOnDevice(Denoising):
     """The same with tensors on a device."""
 
-    def __init__(self, denoiser: ManyDnSS, white: float, device: torch.device) -> None:
-        super().__init__(denoiser, white)
+    def __init__(self, denoiser: ManyDnSS, shown: Callable[[Any], Any], device: torch.device) -> None:
+        super().__init__(denoiser, shown)
         self._fired = torch.from_numpy(self._fired).to(device)
         self._picture = torch.from_numpy(self._picture).to(device)
 
@@ -129,11 +137,11 @@ class DenoisingOnDevice(Denoising):
         finish = [stream for stream, its in enumerate(rates) if len(its)]
         if finish:
             newest: Any = torch.stack([rates[stream][-1] for stream in finish])
-            self._picture[finish, 0] = torch.as_tensor(grey(newest / self._white))
+            self._picture[finish, 0] = torch.as_tensor(self._shown(newest))
         pushed, finished = (
             torch.from_numpy(array).to(spikes.device)[:, None, None] for array in (self.pushed, self.finished)
         )
-        noisy = torch.as_tensor(grey(self._fired.double() / (self._white * pushed.clamp(min=1))))[:, None]
+        noisy = torch.as_tensor(self._shown(self._fired.double() / pushed.clamp(min=1)))[:, None]
         return torch.where(finished[:, None] > 0, self._picture, noisy)
 
 

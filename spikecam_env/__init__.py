@@ -18,6 +18,7 @@ check_siblings()
 OBSERVATIONS_ABOVE |= {
     "rate": ("denoiser.observation:Rate", {}),
     "dim_rate": ("denoiser.observation:Rate", {"white": 0.1}),
+    "root_rate": ("denoiser.observation:Rate", {"gamma": 0.5}),
 }
 
 __all__ = ["__version__", "envs"]

@@ -7,6 +7,8 @@ are lines of a record, so that a study goes on where it was stopped.
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
+from contextlib import closing
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import Annotated, Any, TypeVar
@@ -21,11 +23,12 @@ from spikecam_env.agents.playing import Actor, episodes_along, episodes_of, scor
 from spikecam_env.agents.ppo import PPO
 from spikecam_env.agents.tracker import Tracker
 from spikecam_env.agents.training import SIGHTS, Study, agents_along, learner, train_agent
-from spikecam_env.checked import checked_number
-from spikecam_env.envs.tasks.low_light import LowLight
+from spikecam_env.checked import checked_count, checked_number
+from spikecam_env.envs.tasks import TASKS
 from spikecam_env.errors import InputError, unknown_name
 from spikecam_env.pool import spread
 from spikecam_env.run_folder import run_folder
+from spikecam_env.torch_settings import torch_settings
 from spikecam_env.untrusted import Count, Declared, Name, Positive, Seed, Side, Whole, declared, parse_json, read_text
 from spikecam_env.whole import write_text_whole
 
@@ -45,9 +48,9 @@ class StudyRun(Declared):
     sight: Name
     """A name of `training.SIGHTS`, or of READY."""
     interval: Positive | None = None
-    """Mean interval of a pixel in the test episodes [frames], of LowLight alone; None is the task's own light."""
+    """Mean interval of a pixel in the test episodes [frames]; None is the task's own light."""
     trained: Annotated[tuple[Positive, Positive], Field(strict=False)] | None = None
-    """Shortest and longest interval in training, of LowLight alone; None is that of the test."""
+    """Shortest and longest interval in training [frames]; None is that of the test."""
     shape: Annotated[tuple[Side, Side], Field(strict=False)] | None = None
     """(rows, columns) of the camera; None is the id's."""
     imitate: bool = False
@@ -78,16 +81,18 @@ class StudyRun(Declared):
         """Where its training is kept; cases that are played alone differently have it in common."""
         marks = [self.task, *(f"{size}" for size in self.shape or ())]
         marks += [f"{interval:g}" for interval in dict.fromkeys(self.trained or self._light or ())]
-        return "-".join([*marks, self.sight, *["imitating"] * self.imitate, str(self.seed)])
+        marks += [self.sight, *["imitating"] * self.imitate, *[f"{self.steps}steps"] * (self.steps > 0)]
+        return "-".join([*marks, str(self.seed)])
 
     @property
     def _light(self) -> tuple[float, float] | None:
         return None if self.interval is None else (self.interval, self.interval)
 
     def _under(self, light: tuple[float, float] | None) -> Study:
-        task = {} if light is None else {"task": LowLight(mean_interval=light)}
+        study = Study(self.task, READY.get(self.sight, self.sight))
+        task = {} if light is None else {"task": TASKS[study.name](mean_interval=light)}
         shape = {} if self.shape is None else {"shape": self.shape}
-        return Study(self.task, READY.get(self.sight, self.sight), task | shape)
+        return replace(study, options=task | shape)
 
 
 class Result(Declared):
@@ -105,7 +110,7 @@ class Result(Declared):
 
 
 POINTS = 12
-"""Of a learning curve, evenly over its steps: of the 48 updates of a training, every fourth."""
+"""Of a learning curve, evenly over its steps: of the 48 updates of a training by default, every fourth."""
 
 
 def cases(
@@ -113,19 +118,36 @@ def cases(
     sights: Sequence[str],
     intervals: Sequence[float],
     seeds: Iterable[int],
-    steps: int | None,
+    steps: Sequence[int] = (),
     episodes: int | None = None,
     *,
     trained: tuple[float, float] | None = None,
     shape: tuple[int, int] | None = None,
     imitate: bool = False,
 ) -> list[StudyRun]:
-    """Every cell with every seed, all cells of the first seed first; `intervals` and `trained` are of LowLight."""
+    """Every cell with every seed, all cells of the first seed first.
+
+    Args:
+        tasks: ids.
+        sights: names of SIGHTS or READY.
+        intervals: mean intervals at which each task is played [frames]; none is its own light.
+        seeds: of training.
+        steps: lengths of training, each a cell; none is that of `PPO`.
+        episodes: of the test split; None is `playing.episodes_of` the task.
+        trained: shortest and longest interval in training [frames]; None is the interval of the test.
+        shape: (rows, columns) of the camera; None is the id's.
+        imitate: learn from the oracle (`agents.ppo`).
+
+    Raises:
+        InputError: for an unknown task, sight or shipped agent, and for steps and intervals out of range.
+    """
     for task in tasks:
         Study(task)  # refuses unknown names
     for sight in sights:
         if sight not in (*SIGHTS, *READY):
             raise unknown_name("observation", sight, (*SIGHTS, *READY))
+    for length in steps:
+        checked_count(length, "steps")
     for interval in (*intervals, *(trained or ())):
         checked_number(interval, "interval", 1.0, unit="frames")
     if trained is not None and trained[0] > trained[1]:
@@ -137,17 +159,18 @@ def cases(
             task=task,
             sight=sight,
             interval=interval,
-            trained=trained if task.startswith("LowLight") else None,
+            trained=trained,
             shape=shape,
             imitate=imitate,
             seed=seed,
-            steps=steps or PPO.steps,
+            steps=length,
             episodes=episodes,
         )
         for seed in seeds
         for task in tasks
         for sight in sights
-        for interval in (intervals if task.startswith("LowLight") and intervals else (None,))
+        for length in ((0,) if sight in READY else steps or (PPO.steps,))
+        for interval in (intervals or (None,))
     ]
     for case in runs:
         if case.sight.startswith("shipped") and case.task not in shipped():
@@ -155,32 +178,34 @@ def cases(
     return runs
 
 
-def measure(cases: Sequence[StudyRun], out: Path) -> list[Result]:
+def measure(cases: Sequence[StudyRun], out: Path, points: int = POINTS) -> list[Result]:
     """Results of cases with one training: train, unless nothing is to be learned, and play the test episodes of each.
 
     Args:
         cases: that differ in their test episodes alone.
         out: folder in which the run is kept.
+        points: agents on the way that are played too.
     """
-    curve = _curve(cases[0], out)
+    curve = _curve(cases[0], out, points)
     return [_played(case, curve, out) for case in cases]
 
 
-def _curve(case: StudyRun, out: Path) -> tuple[dict[str, float], ...]:
+def _curve(case: StudyRun, out: Path, points: int) -> tuple[dict[str, float], ...]:
     """The curve of its training, which is done first or completed."""
     if case.sight in READY:
         return ()
     ppo = learner(case.steps, imitate=case.imitate)
-    return tuple(train_agent(case.learned, out / case.folder, ppo, case.seed, points=POINTS).training["curve"])
+    return tuple(train_agent(case.learned, out / case.folder, ppo, case.seed, points=points).training["curve"])
 
 
 def _played(case: StudyRun, curve: tuple[dict[str, float], ...], out: Path) -> Result:
-    env, episodes = case.played.make(split="test"), case.episodes or episodes_of(case.task)
-    try:
+    episodes = case.episodes or episodes_of(case.task)
+    with (
+        closing(case.played.make(split="test")) as env,
+        torch_settings(threads=1),  # more pay for no network here, and where others work too they wait for each other
+    ):
         score = score_of(actor_of(case, out, env), env, episodes)
         along = _along(case, env, episodes_along(episodes), out)
-    finally:
-        env.close()
     return Result(case=case, score=score, cpu_s=curve[-1]["cpu_s"] if curve else 0.0, curve=curve, along=along)
 
 
@@ -200,12 +225,15 @@ def actor_of(case: StudyRun, out: Path, env: gymnasium.Env[Any, Any]) -> Actor:
     return Agent.load(case.task if case.sight in READY else out / case.folder / "agent.pt")
 
 
-def study(wanted: Sequence[StudyRun], out: Path, *, jobs: int = 1, ray: str | None = None) -> list[Result]:
+def study(
+    wanted: Sequence[StudyRun], out: Path, *, points: int = POINTS, jobs: int = 1, ray: str | None = None
+) -> list[Result]:
     """Measure the cases that the record in a folder lacks, and add each to it when it is done.
 
     Args:
         wanted: the cases.
         out: the folder, made if needed, for the record and every run.
+        points: agents on the way that are played too, for learning curves.
         jobs: processes that work at the same time.
         ray: address of a Ray cluster that works instead, or "local".
 
@@ -221,7 +249,7 @@ def study(wanted: Sequence[StudyRun], out: Path, *, jobs: int = 1, ray: str | No
         for case in wanted:
             if case not in known:
                 missing.setdefault(case.folder, []).append(case)
-        runs = spread(partial(measure, out=out), missing.values(), jobs, ray)
+        runs = spread(partial(measure, out=out, points=points), missing.values(), jobs, ray)
         for results in tqdm(runs, total=len(missing), desc="agents", unit="run", disable=None):
             known |= {result.case: result for result in results}
             lines = "".join(result.model_dump_json() + "\n" for result in known.values())

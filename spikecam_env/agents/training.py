@@ -75,8 +75,10 @@ class Study:
 
 
 SIGHTS: dict[str, dict[str, Any]] = {
-    **{obs: {"obs": obs} for obs in ("tfp", "tfi", "spikes", "rate", "dim_rate", "frame30", "frame1000")},
+    **{obs: {"obs": obs} for obs in ("tfp", "root_tfp", "tfi", "spikes", "rate", "dim_rate", "root_rate")},
+    **{obs: {"obs": obs} for obs in ("frame30", "frame1000")},
     "clean": {"obs": "tfp", "model": "ideal"},
+    "root_clean": {"obs": "root_tfp", "model": "ideal"},
 }
 """Observations by name: of the noisy camera, or `clean`, the rates of a camera without noise."""
 

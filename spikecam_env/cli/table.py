@@ -20,6 +20,13 @@ def table(rows: Sequence[Mapping[str, Any]]) -> str:
     return "\n".join([lines[0], "-" * len(lines[0]), *lines[1:]])
 
 
+def markdown(rows: Sequence[Mapping[str, Any]]) -> str:
+    """The same rows as a table of Markdown."""
+    head = list(rows[0]) if rows else ["(nothing)"]
+    lines = [head, ["---"] * len(head), *([_text(row.get(name)) for name in head] for row in rows)]
+    return "\n".join(f"| {' | '.join(line)} |" for line in lines)
+
+
 def _text(value: Any) -> str:
     if value is None:
         return "-"

@@ -26,8 +26,8 @@ class TrainAgent:
     out: Path
     """Folder of the run: agent.pt, curve.json, and last.pt to go on from."""
     obs: str = "tfp"
-    """Observation: tfp, tfi, spikes, rate (denoised), dim_rate (the same, brighter), clean (no noise),
-    frame30 or frame1000."""
+    """Observation: tfp, tfi, spikes, rate (denoised), dim_rate (the same, brighter), clean (no noise), root_tfp,
+    root_rate or root_clean (on a root scale, for the dark), frame30 or frame1000."""
     steps: Count | None = None
     """Steps of all environments together.  Default: as many as the shipped agents had."""
     seed: Seed = 0

@@ -225,14 +225,17 @@ def test_a_study_goes_on_from_its_record(tmp_path: Path, monkeypatch, capsys) ->
         command([*line[:-1], "1"])
     assert (tmp_path / "curves.png").stat().st_size > 1000
     assert command([*line, "--films"]) == 0
-    assert sorted(film.name for film in tmp_path.glob("*.mp4")) == ["Catch-v1-frame30-0.mp4", "Catch-v1-tracker-0.mp4"]
+    assert sorted(film.name for film in tmp_path.glob("*.mp4")) == [
+        "Catch-v1-frame30-64steps-0.mp4",
+        "Catch-v1-tracker-0.mp4",
+    ]
     rows = [row.split() for row in first.splitlines() if row.startswith("Catch-v1")]
     assert [row[1] for row in rows] == ["tracker", "frame30"] and float(rows[0][3]) == 1.0
 
 
 @pytest.mark.slow
 def test_a_learning_curve_has_a_point_for_every_agent_on_the_way(tmp_path: Path) -> None:
-    wanted = studies.cases(["Track-v1"], ["tfp", "tracker"], [], [0], 2 * 1024, 2, shape=(16, 16))
+    wanted = studies.cases(["Track-v1"], ["tfp", "tracker"], [], [0], [2 * 1024], 2, shape=(16, 16))
     learned, tracked = studies.study(wanted, tmp_path)
     print([(row["steps"], round(row["score"], 3)) for row in learned.along], f"at the end {learned.score:.3f}")
     assert [row["steps"] for row in learned.along] == [1024, 2048] and len(learned.curve) == 1
@@ -247,7 +250,7 @@ def test_a_learning_curve_has_a_point_for_every_agent_on_the_way(tmp_path: Path)
 @pytest.mark.slow
 def test_one_training_is_played_at_every_light(tmp_path: Path) -> None:
     wanted = studies.cases(
-        ["LowLight-v1"], ["tfp", "tracker"], [50, 100], [3], 2, 1, trained=(20, 200), shape=(16, 16), imitate=True
+        ["LowLight-v1"], ["tfp", "tracker"], [50, 100], [3], [2], 1, trained=(20, 200), shape=(16, 16), imitate=True
     )
     results = studies.study(wanted, tmp_path)
     assert [(result.case.sight, result.case.interval) for result in results] == [
@@ -257,10 +260,10 @@ def test_one_training_is_played_at_every_light(tmp_path: Path) -> None:
         ("tracker", 100),
     ]
     (folder,) = tmp_path.glob("*/")
-    assert folder.name == "LowLight-v1-16-16-20-200-tfp-imitating-3"
+    assert folder.name == "LowLight-v1-16-16-20-200-tfp-imitating-2steps-3"
     assert Agent.load(folder / "agent.pt").training["ppo"]["imitate"] is True
     with pytest.raises(InputError, match="shortest"):
-        studies.cases(["LowLight-v1"], ["tfp"], [], [0], 2, trained=(200, 20))
+        studies.cases(["LowLight-v1"], ["tfp"], [], [0], [2], trained=(200, 20))
 
 
 def test_a_study_plays_the_agent_that_comes_with_the_package(tmp_path: Path) -> None:
@@ -270,4 +273,4 @@ def test_a_study_plays_the_agent_that_comes_with_the_package(tmp_path: Path) -> 
     assert result.score == score_of(agent, env, 5) > 0
     env.close()
     with pytest.raises(InputError, match=r"ReadDigit-v1.*Catch-v1"):
-        studies.cases(["ReadDigit-v1"], ["shipped"], [], range(1), None)
+        studies.cases(["ReadDigit-v1"], ["shipped"], [], range(1))

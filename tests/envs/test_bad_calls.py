@@ -108,7 +108,7 @@ def test_a_wrong_keyword_gets_a_suggestion(name: str, mode: str) -> None:
 
 def test_a_number_of_a_task_is_not_its_environment_s() -> None:
     text = refused(gymnasium.make, "spikecam_env/LowLight-v1", mean_interval=(50, 50))
-    assert "TaskEnv(LowLight(mean_interval=...))" in text
+    assert "TaskEnv(Track(mean_interval=...))" in text
     assert "sets it itself" in refused(gymnasium.make, "spikecam_env/Track-v1", axes=1)
 
 

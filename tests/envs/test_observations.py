@@ -187,6 +187,34 @@ def test_a_dim_rate_is_the_same_plane_ten_times_brighter() -> None:
         assert dim.max() > bright.max()
 
 
+def test_a_root_picture_is_the_root_of_the_same_rate() -> None:
+    (plain,), (root,) = (shown(law, stream(), FRAMES) for law in (TFP(), TFP(gamma=0.5)))
+    rate = stream().mean(axis=1)
+    assert np.array_equal(root[:, 0], np.floor(255 * np.sqrt(rate.astype(np.float32)) + 0.5))
+    assert plain.mean() < root.mean()
+
+
+def test_a_root_picture_of_the_denoised_rate_is_not_black_in_the_dark() -> None:
+    """At a mean interval of 1000 frames eight bits of the rate itself hold 0 or 1."""
+
+    def shown_last(obs: str) -> Any:
+        env = gymnasium.make(DISK, **SMALL, obs=obs)
+        env.reset(seed=1, options={"light": 0.005})
+        return [env.step(np.zeros(2, np.float32))[0] for _ in range(9)][-1].astype(float)
+
+    plain, root = shown_last("rate"), shown_last("root_rate")
+    print(f"rate {plain.min():.0f} to {plain.max():.0f}, its root {root.min():.0f} to {root.max():.0f}")
+    assert np.all(np.abs(255 * (root / 255) ** 2 - plain) <= 1), "the same rates"
+    assert len(np.unique(root)) > len(np.unique(plain))
+
+
+@pytest.mark.parametrize("law", [TFP, Rate])
+@pytest.mark.parametrize("gamma", [0.0, 1.5, -1.0, "root"])
+def test_a_gamma_that_is_none_is_refused(law: Any, gamma: Any) -> None:
+    with pytest.raises(InputError, match="gamma"):
+        law(gamma=gamma)
+
+
 @pytest.mark.parametrize("obs", ["tfp", "isi", "rate", "frame1000"])
 def test_one_stream_begins_anew_while_another_goes_on(obs: str) -> None:
     law, view = observation(obs), CameraView((8, 8), 20)

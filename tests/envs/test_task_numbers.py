@@ -592,6 +592,8 @@ def test_every_number_of_every_task_is_in_the_table() -> None:
     for kind in TASKS.values():
         parent = kind.__mro__[1]
         for field in fields(kind):
+            if field.default is None:  # the task's own light
+                continue
             if kind is Track or field.default != getattr(parent, field.name, None):
                 assert (kind, field.name) in there, (kind.__name__, field.name)
 

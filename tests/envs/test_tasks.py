@@ -16,8 +16,9 @@ from spikecam_env.envs.course import steps_of
 from spikecam_env.envs.oracle import approach, oracle
 from spikecam_env.envs.registration import SMALL_TASKS, TASK_ENVIRONMENTS, TASK_NAMES
 from spikecam_env.envs.score import BASELINES, play, score
-from spikecam_env.envs.tasks import TASKS
+from spikecam_env.envs.tasks import TASKS, Track
 from spikecam_env.envs.tasks.digits import digit
+from spikecam_env.envs.tasks.env import TaskEnv
 from spikecam_env.envs.tasks.things import TEST_PICTURES, TRAIN_PICTURES
 from spikecam_env.errors import InputError
 
@@ -98,6 +99,25 @@ def test_wrong_names_of_a_task_are_named() -> None:
         gymnasium.make("spikecam_env/Track-v1", split="tests")
     with pytest.raises(InputError, match="unknown reward"):
         gymnasium.make("spikecam_env/Track-v1", reward="none")
+
+
+@pytest.mark.parametrize("name", TASK_NAMES)
+def test_a_task_is_played_at_any_mean_interval(name: str) -> None:
+    """Of the first step: a disc that moves, and an ambient light that swings, change the mean of a thousand frames."""
+    own, dark = (TaskEnv(TASKS[name](mean_interval=light)) for light in (None, (300.0, 300.0)))
+    first, dim = own.opening(0).episode, dark.opening(0).episode
+    light, dimmed = (float(episode.scene.truth(0.5).radiance.mean()) for episode in (first, dim))
+    print(f"{name}: mean interval {1 / light:.0f} frames of its own, {1 / dimmed:.0f} where 300 are asked for")
+    factor = 10 ** TASKS[name]().decades if name == "Exposure" else 1.5
+    assert 300 / factor < 1 / dimmed < 300 * factor
+    assert dim.scene.places(0.5) == first.scene.places(0.5), "the light changes nothing else"
+
+
+@pytest.mark.parametrize("light", [100.0, (200.0, 20.0), (0.5, 20.0), (20.0,), "dark"])
+def test_a_mean_interval_that_is_none_is_refused(light: Any) -> None:
+    env = TaskEnv(Track(mean_interval=light))
+    with pytest.raises(InputError, match="mean_interval"):
+        env.reset(seed=0)
 
 
 def test_approach_stops_on_the_target() -> None:

@@ -50,6 +50,7 @@ OBSERVATIONS: dict[str, Callable[[], Observation]] = {
     "spikes": Spikes,
     "packed": Packed,
     "tfp": TFP,
+    "root_tfp": partial(TFP, gamma=0.5),
     "tfi": TFI,
     "isi": ISI,
     **{name: partial(_of_place, place, keywords) for name, (place, keywords) in OBSERVATIONS_ABOVE.items()},

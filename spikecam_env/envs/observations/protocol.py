@@ -17,6 +17,7 @@ import numpy as np
 from gymnasium import spaces
 from numpy.typing import ArrayLike, NDArray
 
+from spikecam_env.checked import checked_number
 from spikecam_env.renamed import old_names
 from spikecam_env.sensor import Keyframes
 from spikecam_env.types import Masks
@@ -106,11 +107,16 @@ def with_rows(values: Any, rows: Any, which: Masks) -> Any:
     return changed
 
 
-def grey(rate: NDArray[Any]) -> NDArray[np.uint8]:
-    """Spikes a frame, 0 to 1 and cut beyond, as 0 to 255."""
+def grey(rate: NDArray[Any], gamma: float = 1.0) -> NDArray[np.uint8]:
+    """Spikes a frame, 0 to 1 and cut beyond, as 0 to 255: 255 rate^gamma."""
     if not isinstance(rate, np.ndarray):  # a tensor
-        return (255.0 * rate.clamp(max=1.0) + 0.5).byte()
-    return np.asarray((255.0 * np.minimum(rate, 1.0) + 0.5).astype(np.uint8))
+        return (255.0 * rate.clamp(max=1.0) ** gamma + 0.5).byte()
+    return np.asarray((255.0 * np.minimum(rate, 1.0) ** gamma + 0.5).astype(np.uint8))
+
+
+def checked_gamma(gamma: float) -> float:
+    """The exponent of a picture's law, above 0 and at most 1."""
+    return checked_number(gamma, "gamma", 0.0, 1.0, above=True)
 
 
 def picture_space(view: CameraView) -> spaces.Box:

@@ -7,7 +7,11 @@ from typing import Any, ClassVar
 
 import numpy as np
 
+from scenes.exposure import MOST_INTERVAL, expose
+from scenes.flat.discs import Discs
+from spikecam_env.checked import checked_numbers
 from spikecam_env.envs.episode import Episode
+from spikecam_env.errors import InputError
 from spikecam_env.renamed import old_names
 
 
@@ -77,6 +81,9 @@ class Task:
     """Time of an episode at most [s]."""
     success_side: float = 1 / 8
     """Distance from the middle below which the target counts as looked at [shorter sides]."""
+    mean_interval: tuple[float, float] | None = None
+    """Shortest and longest mean interval of an episode [frames], drawn evenly in its logarithm; None is the light
+    of the textures."""
 
     frames_per_step: ClassVar[int] = 40
     """Frames from action to action."""
@@ -93,6 +100,17 @@ class Task:
     def draw(self, rng: np.random.Generator, view: CameraUnits) -> Episode:
         """An episode; everything in it follows from the generator."""
         raise NotImplementedError
+
+    def in_its_light(self, scene: Discs, rng: np.random.Generator) -> Discs:
+        """The scene of an episode, exposed to `mean_interval`; the generator is used for that alone."""
+        if self.mean_interval is None:
+            return scene
+        shortest, longest = checked_numbers(self.mean_interval, "mean_interval", 2, 1.0, MOST_INTERVAL, unit="frames")
+        if shortest > longest:
+            raise InputError(f"mean_interval = {self.mean_interval}; give the shortest, then the longest [frames]")
+        exposed = expose(scene, float(np.exp(rng.uniform(np.log(shortest), np.log(longest)))))
+        assert isinstance(exposed, Discs)
+        return exposed
 
     def common(self, view: CameraUnits) -> dict[str, Any]:
         """Keywords of every `Episode` of the task, scene and target apart."""

@@ -77,7 +77,9 @@ class Catch(Task):
         row = int(self.line * view.side)
         tile[row : row + max(1, int(LINE_SIDES * view.side))] = BRIGHT
         scene = Discs(view.shape, view.frame_rate_hz, tile, {"ball": ball})
-        return Meeting(scene, "ball", **self.common(view), crossing=(float(crossing[0]), frames))
+        return Meeting(
+            self.in_its_light(scene, rng), "ball", **self.common(view), crossing=(float(crossing[0]), frames)
+        )
 
     def reach(self, seconds: float) -> float:
         """How far the motor comes from rest to wherever it is then [shorter sides]."""

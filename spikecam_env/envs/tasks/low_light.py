@@ -5,12 +5,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import ClassVar
 
-import numpy as np
-
-from scenes.exposure import expose
-from scenes.protocol import Placed
-from spikecam_env.envs.episode import Episode
-from spikecam_env.envs.tasks.base import CameraUnits
 from spikecam_env.envs.tasks.track import Track
 
 
@@ -32,14 +26,6 @@ class LowLight(Track):
         That of `Track`: the disc's middle is within 1/8 side of the picture's. Performance: share of the steps.
     """
 
-    mean_interval: tuple[float, float] = (20.0, 200.0)
-    """Shortest and longest mean interval of an episode [frames], drawn evenly in its logarithm."""
+    mean_interval: tuple[float, float] | None = (20.0, 200.0)
 
     stream: ClassVar[int] = 1
-
-    def draw(self, rng: np.random.Generator, view: CameraUnits) -> Episode:
-        """See `Task.draw`."""
-        shortest, longest = np.log(self.mean_interval)
-        scene = expose(self.plane(rng, view), float(np.exp(rng.uniform(shortest, longest))))
-        assert isinstance(scene, Placed)
-        return Episode(scene, "target", **self.common(view))

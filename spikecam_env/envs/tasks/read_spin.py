@@ -64,7 +64,9 @@ class ReadSpin(Task):
         texture, rpm = self.shown(rng, truth)
         disc = disc_of(texture, number_of(rng, view), self.radius * view.side, path, rpm, angle)
         scene = Discs(view.shape, view.frame_rate_hz, background(number_of(rng, view), view.shape), {"disc": disc})
-        return ReadSpinEpisode(scene, "disc", **self.common(view), truth=truth, answers=self.answers)
+        return ReadSpinEpisode(
+            self.in_its_light(scene, rng), "disc", **self.common(view), truth=truth, answers=self.answers
+        )
 
     def shown(self, rng: np.random.Generator, truth: int) -> tuple[str, float]:
         """(texture, turns a minute) of the disc whose answer is number `truth`."""

@@ -61,4 +61,4 @@ class Saccade(Task):
             discs[str(kind)] = disc_of(str(kind), number_of(rng, view), self.radius * view.side, path)
         discs[CUE] = discs.pop(CUE)  # in front, so that it is never hidden
         scene = Discs(view.shape, view.frame_rate_hz, background(number_of(rng, view), view.shape), discs)
-        return Reaching(scene, CUE, **self.common(view), hold=view.steps(self.hold_s))
+        return Reaching(self.in_its_light(scene, rng), CUE, **self.common(view), hold=view.steps(self.hold_s))

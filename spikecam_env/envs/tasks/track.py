@@ -45,8 +45,9 @@ class Track(Task):
         return Episode(self.plane(rng, view), "target", **self.common(view))
 
     def plane(self, rng: np.random.Generator, view: CameraUnits) -> Discs:
-        """The target before its background."""
+        """The target before its background, in its light."""
         speed = self.top_sides_s * rng.uniform(*self.speed)
         path = wander(rng, view, view.beside_middle(rng, *self.start), speed, self.duration_s, self.room)
         target = disc_of("islands", number_of(rng, view), self.radius * view.side, path)
-        return Discs(view.shape, view.frame_rate_hz, background(number_of(rng, view), view.shape), {"target": target})
+        tile = background(number_of(rng, view), view.shape)
+        return self.in_its_light(Discs(view.shape, view.frame_rate_hz, tile, {"target": target}), rng)
