@@ -45,9 +45,7 @@ def with_dark(light: float, pixel: EventPixel = QUIET) -> float:
     return float(np.float32(light)) + pixel.dark
 
 
-def literal(
-    camera: EventCamera, light: Keyframes, frames: int, per_frame: int, noise: Sequence[tuple[float, int]] = ()
-) -> list[tuple[float, bool]]:
+def literal(camera: EventCamera, light: Keyframes, frames: int, per_frame: int) -> list[tuple[float, bool]]:
     """Pixel (0, 0) of a camera that has not begun, by the law of `event_camera.pixel` in tiny steps.
 
     Nothing is shared with the camera but its parameters and its first reference.
@@ -74,28 +72,41 @@ def literal(
     return found
 
 
-@pytest.mark.parametrize(
-    "changes",
-    [{}, {"refractory_us": 500.0}, {"leak_hz": 2000.0}, {"leak_hz": 900.0, "refractory_us": 75.0}],
-    ids=["plain", "refractory", "leak", "both"],
-)
-def test_events_are_those_of_a_literal_simulation(changes: dict[str, float]) -> None:
-    """In steps of a hundredth of a frame: each event is there, with its polarity, at its time within the steps.
+def coarse_film(seed: int) -> Keyframes:
+    """Light of one pixel at times that a literal simulation hits, quarters of a frame, with a jump."""
+    rng = np.random.default_rng(seed)
+    times = np.cumsum(rng.integers(4, 32, 24)) / 4.0 - 4.0
+    times = np.insert(times, 12, np.nextafter(times[12], -np.inf))
+    return Keyframes(times, (10.0 ** rng.uniform(-2.0, 0.0, (times.size, 1, 1))).astype(np.float32))
 
-    A simulation finds an event a step late at most, so a reference that follows the light is off by as much light as
-    changes in a step: times of later events differ by some steps.
+
+@pytest.mark.parametrize(
+    ("changes", "tolerance"),
+    [
+        ({}, 0.001),
+        ({"leak_hz": 2000.0}, 0.001),
+        ({"refractory_us": 500.0}, 0.15),
+        ({"leak_hz": 900.0, "refractory_us": 75.0}, 0.15),
+    ],
+    ids=["plain", "leak", "refractory", "both"],
+)
+def test_events_are_those_of_a_literal_simulation(changes: dict[str, float], tolerance: float) -> None:
+    """In steps of a thousandth of a frame: each event is there, with its polarity, a step late at most.
+
+    A refractory period then ends a step late too, and the reference is off by the change of light in a step: the next
+    event is off by as many steps as light was faster there than it is now, up to a hundred in these films.
     """
-    per_frame, worst, events = 100, 0.0, 0
+    per_frame, worst, events = 1000, 0.0, 0
     for seed in range(6):
-        light = film(seed, (1, 1), 120, 24)
+        light = coarse_film(seed)
         camera = EventCamera(replace(QUIET, mismatch=0.03, **changes), (1, 1), seed)
         slow = literal(camera, light, 120, per_frame)
         fast = camera.step(light, 120)
         assert fast.p.tolist() == [rose for _, rose in slow]
         events += len(fast)
-        worst = max(worst, float(np.abs(fast.t - [t for t, _ in slow]).max()) * RATE * per_frame)
-    print(f"{events} events, times within {worst:.2f} steps of 1/{per_frame} frame")
-    assert events > 100 and worst < 3.0
+        worst = max(worst, float(np.abs(fast.t - [t for t, _ in slow]).max()) * RATE)
+    print(f"{events} events of 6 films, times within {worst:.4f} frames")
+    assert events >= 30 and worst < tolerance * (1 + 1e-6)
 
 
 def test_a_ramp_gives_an_event_each_time_its_logarithm_is_a_threshold_higher() -> None:
@@ -199,8 +210,7 @@ def test_no_cut_of_the_stream_changes_a_bit(pixel: EventPixel) -> None:
     parts = recorded(EventCamera(pixel, SHAPE, 5), light, cuts)
     print(f"{len(whole)} events, {len(cuts)} calls")
     assert len(whole) > 1000
-    for name in ("t", "x", "y", "p"):
-        np.testing.assert_array_equal(getattr(parts, name), getattr(whole, name))
+    assert parts == whole
     assert (np.diff(whole.t) >= 0).all()
 
 
@@ -214,7 +224,7 @@ def test_light_in_pieces_gives_the_events_of_the_whole() -> None:
     for key in range(0, 50, 10):
         own = Keyframes(times[key : key + 11], whole.radiance[key : key + 11])
         parts.append(other.step(own, 40))
-    np.testing.assert_array_equal(EventList.joined(parts).t, one.step(whole, 200).t)
+    assert EventList.joined(parts) == one.step(whole, 200)
 
 
 def test_light_that_is_another_in_the_next_call_acts_from_there() -> None:
@@ -233,10 +243,10 @@ def test_a_state_goes_on_where_it_was_taken_and_through_a_pickle() -> None:
     other = EventCamera(EventPixel(), SHAPE, 0)
     other.restore(state)
     again = other.step(light, 60)
-    np.testing.assert_array_equal(again.t, expected.t)
+    assert again == expected and len(again) > 100
     other.reset()
     assert other.frame == 0
-    np.testing.assert_array_equal(other.step(light, 90).t, EventCamera(EventPixel(), SHAPE, 7).step(light, 90).t)
+    assert other.step(light, 90) == EventCamera(EventPixel(), SHAPE, 7).step(light, 90)
 
 
 def test_thresholds_are_normal_with_their_spread_and_units_differ() -> None:

@@ -18,7 +18,7 @@ WORD_US = 64.0
 """Time [us] after which EVT 2.0 needs another word of time: an event has the lower six bits of its microsecond."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class EventList:
     """Events in the order of time; events of the same moment in that of pixels.
 
@@ -39,6 +39,12 @@ class EventList:
 
     def __len__(self) -> int:
         return len(self.t)
+
+    def __eq__(self, other: object) -> bool:
+        """Whether the other has the same events, to the bit."""
+        if not isinstance(other, EventList):
+            return NotImplemented
+        return all(np.array_equal(getattr(self, name), getattr(other, name)) for name in ("t", "x", "y", "p"))
 
     @classmethod
     def none(cls) -> EventList:

@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 from spikecam_env.compiled import njit
 from spikecam_env.sensor.compiled_tools.draws import GOLDEN, first_key, scramble, second_key
 from spikecam_env.sensor.event_camera.pixel import Law
+from spikecam_env.sensor.light import INSTANT
 from spikecam_env.types import Floats, Pictures
 
 DRAWS = 0x98AA1746
@@ -88,18 +89,25 @@ def leaked(level: float, leak: float, time: float) -> float:
 
 
 @njit(cache=True, error_model="numpy")
-def rising(line: Line, level: float, leak: float, since: float) -> float:
+def rising(line: Line, level: float, leak: float, since: float, start: float) -> float:
     """The first moment at which light is up to the level; NEVER where that is not before the line's end."""
-    t = max(line.begin, since)
-    if at(line, t) >= leaked(level, leak, t - since):
-        return t
-    if line.slope <= 0.0:
-        if leak == 0.0 or -line.slope >= leak * leaked(level, leak, t - since):
-            return NEVER  # g falls from here on
-        if line.slope < 0.0:
-            peak = since + np.log(leak * level / -line.slope) / leak
-            if at(line, peak) < leaked(level, leak, peak - since):
-                return NEVER
+    if line.slope < 0.0:
+        jump = jumped_at(line, since, start)
+        if jump < NEVER and at(line, jump) >= leaked(level, leak, jump - since):
+            return jump
+    begin = max(line.begin, since)
+    if line.slope >= 0.0 and at(line, begin) >= leaked(level, leak, begin - since):
+        return begin
+    if line.slope > 0.0:
+        if at(line, line.end) < leaked(level, leak, line.end - since):
+            return NEVER
+    elif leak == 0.0 or -line.slope >= leak * leaked(level, leak, begin - since):
+        return NEVER  # g falls from here on
+    elif line.slope < 0.0:
+        peak = since + np.log(leak * level / -line.slope) / leak
+        if at(line, peak) < leaked(level, leak, peak - since):
+            return NEVER
+    t = begin
     for _ in range(MOST_STEPS):
         now = leaked(level, leak, t - since)
         after = t - (at(line, t) - now) / (line.slope + leak * now)
@@ -108,17 +116,20 @@ def rising(line: Line, level: float, leak: float, since: float) -> float:
         t = after
         if t >= line.end:
             return NEVER
-    return t
+    return within(t, begin, line.end)
 
 
 @njit(cache=True, error_model="numpy")
-def falling(line: Line, level: float, leak: float, since: float) -> float:
+def falling(line: Line, level: float, leak: float, since: float, start: float) -> float:
     """The first moment at which light is down at the level; NEVER where that is not before the line's end."""
+    if line.slope > 0.0:
+        jump = jumped_at(line, since, start)
+        return jump if jump < NEVER and at(line, jump) <= leaked(level, leak, jump - since) else NEVER
     begin = max(line.begin, since)
     if at(line, begin) <= leaked(level, leak, begin - since):
         return begin
     t = line.end
-    if line.slope >= 0.0 or at(line, t) > leaked(level, leak, t - since):
+    if line.slope == 0.0 or at(line, t) > leaked(level, leak, t - since):
         return NEVER
     for _ in range(MOST_STEPS):
         now = leaked(level, leak, t - since)
@@ -126,7 +137,22 @@ def falling(line: Line, level: float, leak: float, since: float) -> float:
         if not after < t:
             break
         t = after
-    return NEVER if t >= line.end else max(t, begin)
+    return within(t, begin, line.end)
+
+
+@njit(inline="always")
+def jumped_at(line: Line, since: float, start: float) -> float:
+    """When light may be beyond a threshold against its slope: where it jumped, at the line's begin or the call's."""
+    jump = max(line.begin, start)
+    return jump if since <= line.begin or since < jump else NEVER
+
+
+@njit(inline="always")
+def within(t: float, begin: float, end: float) -> float:
+    """A crossing inside a line; NEVER where rounding takes it to the end, which is the next line's begin."""
+    if t <= begin:
+        t = np.nextafter(begin, np.inf)
+    return NEVER if t >= end else t
 
 
 @njit(inline="always")
@@ -168,7 +194,15 @@ def line_of(keys: Floats, radiance: Pictures, key: int, p: int, dark: float) -> 
 
 @njit(inline="always")
 def crossing(
-    line: Line, high: float, before: float, reference: float, since: float, on: float, off: float, leak: float
+    line: Line,
+    high: float,
+    start: float,
+    before: float,
+    reference: float,
+    since: float,
+    on: float,
+    off: float,
+    leak: float,
 ) -> tuple[float, int]:
     """When light next crosses a threshold, and its polarity, 1 or -1; (NEVER, 0) where it does not before a moment.
 
@@ -176,11 +210,13 @@ def crossing(
 
     Args:
         high: light at the line's end.
+        start: of the call; light may have jumped there.
     """
     lowest = reference * on * (1.0 - leak * (before - since)) * SAFETY
     if max(line.level, high) < lowest and min(line.level, high) * SAFETY > reference * off:
         return NEVER, 0
-    rise, fall = rising(line, reference * on, leak, since), falling(line, reference * off, leak, since)
+    rise = rising(line, reference * on, leak, since, start)
+    fall = falling(line, reference * off, leak, since, start)
     return (fall, -1) if fall < rise else (rise, 1)
 
 
@@ -216,13 +252,15 @@ def expose(
         for key in range(first, until):
             line, at_end = line_of(keys, radiance, key, p, law.dark)
             before = min(line.end, stop)
+            if line.end - line.begin < INSTANT:  # a jump, which the next line begins after
+                continue
             while True:
                 t, polarity = NEVER, 0
                 if since < before:
                     if reference < 0.0:
                         reference = -reference * at(line, max(since, line.begin))
-                    t, polarity = crossing(line, at_end, before, reference, since, on, off, law.leak)
-                    t = max(t, start)  # of light that is not the same as in the call before
+                    t, polarity = crossing(line, at_end, start, before, reference, since, on, off, law.leak)
+                    t = max(t, start)  # where light is not the same as in the call before
                 is_noise = noise < min(t, before)
                 if is_noise:
                     t, polarity = noise, noise_polarity(p, drawn, low, high, at(line, noise) - law.dark, law)
