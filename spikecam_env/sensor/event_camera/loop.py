@@ -231,7 +231,7 @@ def expose(
     thresholds: Thresholds,
     pixels: Pixels,
 ) -> Found:
-    """The events of [start, stop), pixel by pixel; `pixels` are then at `stop`.
+    """The events of [start, stop), line by line, pixel by pixel; `pixels` are then at `stop`.
 
     Args:
         law: parameters.
@@ -246,14 +246,14 @@ def expose(
     times, places, rose, used = np.empty(256), np.empty(256, np.int64), np.empty(256, np.bool_), 0
     first, until = np.searchsorted(keys, start, side="right") - 1, np.searchsorted(keys, stop, side="left")
     low, high = words
-    for p in range(radiance.shape[1]):
-        on, off = thresholds.on[p], thresholds.off[p]
-        reference, since, noise, drawn = pixels.reference[p], pixels.since[p], pixels.noise[p], pixels.drawn[p]
-        for key in range(first, until):
+    for key in range(first, until):
+        if 0 <= key < keys.size - 1 and keys[key + 1] - keys[key] < INSTANT:
+            continue  # a jump, which the next line begins after
+        for p in range(radiance.shape[1]):
+            on, off = thresholds.on[p], thresholds.off[p]
+            reference, since, noise, drawn = pixels.reference[p], pixels.since[p], pixels.noise[p], pixels.drawn[p]
             line, at_end = line_of(keys, radiance, key, p, law.dark)
             before = min(line.end, stop)
-            if line.end - line.begin < INSTANT:  # a jump, which the next line begins after
-                continue
             while True:
                 t, polarity = NEVER, 0
                 if since < before:
@@ -284,7 +284,7 @@ def expose(
                 else:
                     reference = leaked(reference, law.leak, t - since) * (on if polarity > 0 else off)
                 since = held
-        pixels.reference[p], pixels.since[p], pixels.noise[p], pixels.drawn[p] = reference, since, noise, drawn
+            pixels.reference[p], pixels.since[p], pixels.noise[p], pixels.drawn[p] = reference, since, noise, drawn
     return times[:used], places[:used], rose[:used]
 
 
