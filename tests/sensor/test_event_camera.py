@@ -214,6 +214,32 @@ def test_no_cut_of_the_stream_changes_a_bit(pixel: EventPixel) -> None:
     assert (np.diff(whole.t) >= 0).all()
 
 
+def test_no_cut_changes_a_bit_of_wild_light_late_in_a_stream() -> None:
+    """Keys from 1e-10 to 100 frames apart, light of fifteen decades and none, after up to a million frames."""
+    rng, total = np.random.default_rng(0), 0
+    for trial in range(200):
+        begin = int(rng.choice([0, 1000, 10**6]))
+        times = np.unique(begin + np.cumsum(10.0 ** rng.uniform(-10.0, 2.0, rng.integers(1, 12))) - rng.uniform(0, 20))
+        levels = 10.0 ** rng.uniform(-9.0, 6.0, (times.size, 2, 3))
+        light = Keyframes(times, np.where(rng.random(levels.shape) < 0.2, 0.0, levels).astype(np.float32))
+        pixel = EventPixel(
+            threshold_on=float(rng.choice([0.01, 0.2, 3.0])),
+            threshold_off=float(rng.choice([0.01, 0.2, 3.0])),
+            refractory_us=float(rng.choice([0.0, 1e-12, 1.0, 500.0])),
+            leak_hz=float(rng.choice([0.0, 0.1, 1e4])),
+            noise_hz=float(rng.choice([0.0, 5.0, 1e4])),
+        )
+        camera = EventCamera(pixel, (2, 3), trial)
+        camera.step(np.zeros((2, 3), np.float32), begin or 1)
+        state = camera.state()
+        whole = camera.step(light, 60)
+        camera.restore(state)
+        assert recorded(camera, light, (1, 13, 6, 1, 39)) == whole, pixel
+        total += len(whole)
+    print(f"{total} events")
+    assert total > 50_000
+
+
 def test_light_in_pieces_gives_the_events_of_the_whole() -> None:
     """Each call has the key frames about its own frames, as environments give them."""
     times = np.arange(0.0, 201.0, 4.0)

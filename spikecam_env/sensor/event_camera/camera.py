@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -55,20 +55,21 @@ def exposed(state: EventCameraState, light: Keyframes | ArrayLike, frames: int) 
     if isinstance(given, Keyframes) and given.on_device:
         raise InputError("radiance is a tensor; an event camera takes arrays: leave out device=")
     keys, radiance = (given.frame, given.radiance) if isinstance(given, Keyframes) else (np.zeros(1), given[None])
-    stop = state.frame + frames
-    pixels = Pixels(*(array.copy() for array in state.pixels))
-    law = state.pixel.law(state.frame_rate_hz)
-    flat = radiance.reshape(len(radiance), -1)
+    stop, pixels = state.frame + frames, Pixels(*(array.copy() for array in state.pixels))
     times, places, rose = expose(
-        law, state.words, keys, flat, float(state.frame), float(stop), state.thresholds, pixels
+        state.pixel.law(state.frame_rate_hz),
+        state.words,
+        np.require(keys, requirements="W"),  # numba would compile anew for read-only arrays
+        np.require(radiance.reshape(len(radiance), -1), requirements="W"),
+        float(state.frame),
+        float(stop),
+        state.thresholds,
+        pixels,
     )
     order = np.argsort(times, kind="stable")
     y, x = np.divmod(places[order].astype(np.int32), np.int32(state.shape[1]))
     events = EventList(times[order] / state.frame_rate_hz, x, y, rose[order])
-    after = EventCameraState(
-        state.pixel, state.shape, state.frame_rate_hz, state.seed, stop, state.thresholds, state.words, pixels
-    )
-    return events, after
+    return events, replace(state, frame=stop, pixels=pixels)
 
 
 class EventCamera:
