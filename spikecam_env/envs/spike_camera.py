@@ -72,9 +72,8 @@ class SpikeCameraEnv(gymnasium.Env[Any, NDArray[np.float32]]):
         are the scene's.
     Info:
         time_s, frame (end of the block), gaze (2,) float64 [pixels] there, age [frames] of the picture (-1 before the
-        first valid one), camera_bits that the observation's camera sent in the step; with obs="events" also the
-        `events`; with `ground_truth` also radiance, flow, object_id at the centre of the block and poses, see
-        `scenes.protocol.Truth`.
+        first valid one), camera_bits that the observation's camera sent in the step; with `ground_truth` also radiance,
+        flow, object_id at the centre of the block and poses, see `scenes.protocol.Truth`.
     Render:
         `rgb_array`, the share of frames with a spike, over the last blocks of RENDER_FRAMES or more; white is a spike
         every frame, gamma 2.2.

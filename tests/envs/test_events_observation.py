@@ -49,7 +49,7 @@ def test_every_task_takes_it(name: str) -> None:
 
 def test_events_are_those_of_an_event_camera_in_the_same_light() -> None:
     """The light of each step's block, one after another, in a camera of the episode's seed."""
-    env = gymnasium.make(DISK, **SMALL, obs=EventCounts(bins=2)).unwrapped
+    env = gymnasium.make(DISK, **SMALL, obs=EventCounts(bins=2, listed=True)).unwrapped
     seen, info = env.reset(seed=3)
     camera = EventCamera(EventPixel(), (24, 32), env.blocks.seeds[0])  # type: ignore[attr-defined]
     for _ in range(5):
@@ -63,7 +63,7 @@ def test_events_are_those_of_an_event_camera_in_the_same_light() -> None:
 
 
 def test_a_white_of_255_gives_numbers_of_events() -> None:
-    env = gymnasium.make(DISK, **SMALL, obs=EventCounts(EventPixel(refractory_us=20.0), white=255.0))
+    env = gymnasium.make(DISK, **SMALL, obs=EventCounts(EventPixel(refractory_us=20.0), white=255.0, listed=True))
     seen, infos = played(env, 3)
     for picture, info in zip(seen, infos, strict=True):
         np.testing.assert_array_equal(picture, info["events"].counts((24, 32)))
@@ -88,7 +88,7 @@ def test_edges_of_a_turning_camera_have_both_signs() -> None:
 
 @pytest.mark.parametrize("mode", [AutoresetMode.NEXT_STEP, AutoresetMode.SAME_STEP])
 def test_a_native_vector_gives_the_bits_of_single_environments(mode: AutoresetMode) -> None:
-    options: dict[str, Any] = {"obs": "events", "obs_state": True, "max_episode_steps": 5}
+    options: dict[str, Any] = {"obs": EventCounts(listed=True), "obs_state": True, "max_episode_steps": 5}
     many = gymnasium.make_vec(TRACK, 3, "vector_entry_point", autoreset_mode=mode, **options)
     sync = gymnasium.make_vec(TRACK, 3, "sync", {"autoreset_mode": mode}, **options)
     pairs = [(many.reset(seed=5), sync.reset(seed=5))]
@@ -165,7 +165,7 @@ def test_info_has_the_bits_that_each_camera_sends(obs: Any, bits: float) -> None
 
 
 def test_bits_of_events_are_a_word_an_event_and_the_words_of_time() -> None:
-    env = gymnasium.make(DISK, **SMALL, obs="events")
+    env = gymnasium.make(DISK, **SMALL, obs=EventCounts(listed=True))
     _, infos = played(env, 9)
     for info in infos:
         assert info["camera_bits"] == 32 * (len(info["events"]) + 1000 / 64)
@@ -176,6 +176,7 @@ def test_bits_of_events_are_a_word_an_event_and_the_words_of_time() -> None:
     [
         (lambda: EventCounts(bins=0), "bins = 0"),
         (lambda: EventCounts(white=0.0), "white = 0"),
+        (lambda: EventCounts(listed="yes"), "listed = 'yes'"),  # type: ignore[arg-type]
         (lambda: EventCounts("noisy"), "pixel is 'noisy'"),  # type: ignore[arg-type]
         (lambda: observation("event"), r"unknown obs 'event'.*events\?"),
         (

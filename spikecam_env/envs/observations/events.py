@@ -2,8 +2,8 @@
 
     picture = 255 * events of a pixel in the step / `white`        ON and OFF, one channel each
 
-The camera is `sensor.event_camera`; an episode's unit is of the spike camera's own seed.  Info has the events one by
-one, and the bits in which they are sent.
+The camera is `sensor.event_camera`; an episode's unit is of the spike camera's own seed.  Info has the bits in which
+events are sent and, on demand, the events one by one.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ import numpy as np
 from gymnasium import spaces
 from numpy.typing import NDArray
 
-from spikecam_env.checked import checked_count, checked_number
+from spikecam_env.checked import checked_count, checked_number, checked_switch
 from spikecam_env.envs.observations.protocol import Blocks, CameraView, Observation, grey
 from spikecam_env.errors import InputError
 from spikecam_env.sensor import EventPixel
@@ -37,12 +37,12 @@ class EventStreams(NamedTuple):
 class EventCounts(Observation):
     """(2 bins, H, W) uint8: events of each pixel in the step; ON and OFF of its first part, of its second, ...
 
-    Info has `events`, the step's `EventList`, whose times are of the episode, and `camera_bits`, a word of 32 bits an
-    event and 64 us (EVT 2.0).
+    Info has `camera_bits`, a word of 32 bits an event and 64 us (EVT 2.0), and, where `listed`, `events`, the step's
+    `EventList`, whose times are of the episode.
 
     Raises:
-        InputError: for a pixel that is no `EventPixel`, bins below 1, a white that is not above 0, and in `step` where
-            the light is not known.
+        InputError: for a pixel that is no `EventPixel`, bins below 1, a white that is not above 0, a `listed` that is
+            neither True nor False, and in `step` where the light is not known.
     """
 
     pixel: EventPixel = field(default_factory=EventPixel)
@@ -50,11 +50,14 @@ class EventCounts(Observation):
     """Parts of equal length that a step is cut into."""
     white: float = 8.0
     """Events that give 255; with 255 the picture is the number of events."""
+    listed: bool = False
+    """Whether info has the events one by one: an object, which TorchRL takes no info of."""
 
     def __post_init__(self) -> None:
         checked_pixel(self.pixel)
         checked_count(self.bins, "bins")
         checked_number(self.white, "white", 0.0, above=True, unit="events")
+        checked_switch(self.listed, "listed")
 
     def space(self, view: CameraView) -> spaces.Box:
         return spaces.Box(0, 255, (2 * self.bins, *view.shape), np.uint8)
@@ -77,6 +80,10 @@ class EventCounts(Observation):
         return pictures, after
 
     def info(self, blocks: Blocks, state: EventStreams) -> list[dict[str, Any]]:
-        """As of `Observation`, with `events`."""
+        """As of `Observation`, with `events` where they are listed."""
         duration_s = blocks.frames / blocks.frame_rate_hz
-        return [{"camera_bits": sent_bits(len(events), duration_s), "events": events} for events in state.events]
+        infos: list[dict[str, Any]] = [{"camera_bits": sent_bits(len(its), duration_s)} for its in state.events]
+        if self.listed:
+            for info, its in zip(infos, state.events, strict=True):
+                info["events"] = its
+        return infos
