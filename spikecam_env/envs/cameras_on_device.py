@@ -60,7 +60,7 @@ class DeviceCameras:
             self._batch.exchange(numbers, batch)
         for env, own, block in zip(envs, light, spikes, strict=True):
             env.record(own, block)
-        return Blocks(spikes, light, envs[0].model.frame_rate_hz)
+        return Blocks(spikes, light, envs[0].model.frame_rate_hz, [env.blocks.seeds[0] for env in envs])
 
     def _light(self, envs: Sequence[SpikeCameraEnv], each: ForEach) -> list[Any]:
         """The light of the next block of each, planar scenes painted on the device."""

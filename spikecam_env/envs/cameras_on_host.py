@@ -25,7 +25,8 @@ class HostCameras:
         envs = [self._envs[n] for n in numbers]
         spikes = np.empty((len(envs), envs[0].frames_per_step, *envs[0].shape), np.uint8)
         expose(envs, outs=list(spikes), threads=self._threads, each=by_place(each, numbers))
-        return Blocks(spikes, [env.blocks.light[0] for env in envs], envs[0].model.frame_rate_hz)
+        light, seeds = [env.blocks.light[0] for env in envs], [env.blocks.seeds[0] for env in envs]
+        return Blocks(spikes, light, envs[0].model.frame_rate_hz, seeds)
 
     def returned(self, values: Any) -> Any:
         """Arrays as agents have them."""

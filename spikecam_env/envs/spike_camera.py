@@ -72,8 +72,8 @@ class SpikeCameraEnv(gymnasium.Env[Any, NDArray[np.float32]]):
         are the scene's.
     Info:
         time_s, frame (end of the block), gaze (2,) float64 [pixels] there, age [frames] of the picture (-1 before the
-        first valid one); with `ground_truth` also radiance, flow, object_id at the centre of the block and poses, see
-        `scenes.protocol.Truth`.
+        first valid one), camera_bits that the observation's camera sent in the step; with `ground_truth` also radiance,
+        flow, object_id at the centre of the block and poses, see `scenes.protocol.Truth`.
     Render:
         `rgb_array`, the share of frames with a spike, over the last blocks of RENDER_FRAMES or more; white is a spike
         every frame, gamma 2.2.
@@ -144,6 +144,7 @@ class SpikeCameraEnv(gymnasium.Env[Any, NDArray[np.float32]]):
         self._drawn: Any = None  # the scene as it was drawn, in its own light
         self._seen: Any = None
         self._blocks: Blocks | None = None
+        self._camera_seed = 0  # of this episode
         self._gaze = Gaze.fixed(0.0, 0.0)  # the path of the block that is exposed last, or next
         self._recent: list[NDArray[np.uint8]] = []
         self.action_space = spaces.Box(-1.0, 1.0, (2,), np.float32)
@@ -191,7 +192,8 @@ class SpikeCameraEnv(gymnasium.Env[Any, NDArray[np.float32]]):
         register_user(self)
         self._drawn = self._checked(self._make_scene(self.np_random, given))
         self._scene = lit(self._drawn, light)
-        self._load(model, int(self.np_random.integers(2**31)))
+        self._camera_seed = int(self.np_random.integers(2**31))
+        self._load(model, self._camera_seed)
         self._seen = self.observation.start(self.view, 1)
         self._recent = []
         self._gaze = Gaze((0.0, 0.0), (0.0, 0.0), (0.0, float(self.frames_per_step)))
@@ -298,7 +300,7 @@ class SpikeCameraEnv(gymnasium.Env[Any, NDArray[np.float32]]):
 
     def record(self, light: Keyframes, spikes: NDArray[np.uint8]) -> None:
         """Keep the exposed block: spikes (K, H, W)."""
-        self._blocks = Blocks(spikes[None], (light,), self.model.frame_rate_hz)
+        self._blocks = Blocks(spikes[None], (light,), self.model.frame_rate_hz, (self._camera_seed,))
         if self.render_mode is not None:
             blocks = -(-RENDER_FRAMES // self.frames_per_step)
             self._recent = [*self._recent, spikes.copy()][-blocks:]
@@ -308,7 +310,7 @@ class SpikeCameraEnv(gymnasium.Env[Any, NDArray[np.float32]]):
         picture, self._seen = self.observation.step(self.blocks, self._seen)
         _check_picture(picture, self._picture_space, self.observation)
         age = float(np.asarray(self.observation.age(self._seen)).reshape(-1)[0])
-        info = self._info() | {"age": age}
+        info = self._info() | {"age": age} | self.observation.info(self.blocks, self._seen)[0]
         if not self.obs_state:
             return picture[0], info
         return {name: array[0] for name, array in with_state(picture, self._gaze.stop, age).items()}, info

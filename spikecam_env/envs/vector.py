@@ -25,7 +25,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from spikecam_env.checked import checked_count
 from spikecam_env.envs.cameras_on_host import HostCameras
-from spikecam_env.envs.observations import Spikes, replaced, restarted, with_rows, with_state
+from spikecam_env.envs.observations import Blocks, Spikes, replaced, restarted, with_rows, with_state
 from spikecam_env.envs.registration import MAX_EPISODE_STEPS
 from spikecam_env.envs.spike_camera import SpikeCameraEnv, in_turn
 from spikecam_env.envs.vector_infos import batched
@@ -266,11 +266,12 @@ class SpikeCameraVectorEnv(VectorEnv[Any, Any, Any]):
     ) -> tuple[Any, NDArray[np.float64], NDArray[np.bool_], NDArray[np.bool_], list[dict[str, Any]]]:
         """The next block of all, and infos by environment; fresh (N,): which episodes begin with it."""
         numbers = range(self.num_envs)
-        picture, self._state = self.observation.step(self._cameras.exposed(self.each, numbers), self._state)
+        blocks = self._cameras.exposed(self.each, numbers)
+        picture, self._state = self.observation.step(blocks, self._state)
         outcomes = self._by_scene(lambda n: self._outcome(n, bool(fresh[n])), numbers)
         rewards, terminated, truncated, infos = (list(values) for values in zip(*outcomes, strict=True))
         late = False if self.max_episode_steps is None else self._steps >= self.max_episode_steps
-        seen = self._observed(picture, self._state, infos)
+        seen = self._observed(picture, blocks, self._state, infos)
         return (
             seen,
             np.array(rewards, np.float64),
@@ -286,7 +287,7 @@ class SpikeCameraVectorEnv(VectorEnv[Any, Any, Any]):
         blocks = self._cameras.exposed(self.each, numbers)
         picture, state = self.observation.step(blocks, self.observation.start(self._view, len(numbers)))
         own = self._by_scene(lambda n: self.envs[n].begun()[1], numbers)
-        seen = self._observed(picture, state, own)
+        seen = self._observed(picture, blocks, state, own)
         infos: list[dict[str, Any]] = [{} for _ in self.envs]
         for n, info in zip(numbers, own, strict=True):
             infos[n] = info
@@ -303,11 +304,11 @@ class SpikeCameraVectorEnv(VectorEnv[Any, Any, Any]):
             first[n] = {"final_obs": _row(final, n), "final_info": infos[n]} | first[n]
         return with_rows(seen, rows, over), [a if b else c for a, b, c in zip(first, over, infos, strict=True)]
 
-    def _observed(self, picture: Any, state: Any, infos: Sequence[dict[str, Any]]) -> Any:
-        """The observation of some streams; the age of the picture goes into infos."""
+    def _observed(self, picture: Any, blocks: Blocks, state: Any, infos: Sequence[dict[str, Any]]) -> Any:
+        """The observation of some streams; the age of the picture and what else the law says go into infos."""
         age = np.broadcast_to(self.observation.age(state), (len(infos),)).astype(np.float64)
-        for info, its in zip(infos, age.tolist(), strict=True):
-            info["age"] = its
+        for info, its, more in zip(infos, age.tolist(), self.observation.info(blocks, state), strict=True):
+            info.update(more, age=its)
         return with_state(picture, [info["gaze"] for info in infos], age) if self.obs_state else picture
 
     def _outcome(self, n: int, fresh: bool) -> Outcome:

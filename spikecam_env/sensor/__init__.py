@@ -1,8 +1,9 @@
-"""The pixel: models of ordered effects, and the sensor that steps them."""
+"""The pixel: models of ordered effects, and the sensor that steps them; and an event camera on the same light."""
 
 from typing import TYPE_CHECKING, Any
 
 from spikecam_env.sensor.effects import CATALOGUE, Effect, Stage
+from spikecam_env.sensor.event_camera import EventCamera, EventCameraState, EventList, EventPixel
 from spikecam_env.sensor.light import Keyframes
 from spikecam_env.sensor.model import SensorModel
 from spikecam_env.sensor.own_effects import effects_from, load_effects, load_installed_effects
@@ -16,6 +17,10 @@ __all__ = [
     "CATALOGUE",
     "Circuit",
     "Effect",
+    "EventCamera",
+    "EventCameraState",
+    "EventList",
+    "EventPixel",
     "Keyframes",
     "SensorBatchState",
     "SensorModel",

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from spikecam_env.sensor import Keyframes, SensorModel, SpikeSensor, crossing, decay, random_fields
 from spikecam_env.sensor.compiled_tools import draws
+from spikecam_env.sensor.event_camera import loop as event_loop
 from spikecam_env.sensor.kernels import block_loop, every_frame, fast, loop
 from spikecam_env.sensor.light import Segment
 
@@ -94,6 +95,7 @@ def test_threads_and_cameras_of_both_kinds_in_a_call_change_no_bit() -> None:
         (loop, "DRAWS", draws),
         (random_fields, "DRAWS", draws),
         (block_loop, "DRAWS", draws),
+        (event_loop, "DRAWS", draws),
         (block_loop, "DECAY", decay),
         (block_loop, "CROSSING", crossing),
         (every_frame, "LOOP", loop),

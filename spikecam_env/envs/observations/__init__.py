@@ -8,6 +8,7 @@ from pkgutil import resolve_name
 from typing import Any
 
 from spikecam_env.envs.observations.blocks import Multibinary, Packed, Spikes, block_shape
+from spikecam_env.envs.observations.events import EventCounts
 from spikecam_env.envs.observations.frame_camera import FrameCamera
 from spikecam_env.envs.observations.intervals import ISI, TFI
 from spikecam_env.envs.observations.playback import TFP
@@ -24,6 +25,7 @@ __all__ = [
     "TFP",
     "Blocks",
     "CameraView",
+    "EventCounts",
     "FrameCamera",
     "Multibinary",
     "Observation",
@@ -56,6 +58,7 @@ OBSERVATIONS: dict[str, Callable[[], Observation]] = {
     **{name: partial(_of_place, place, keywords) for name, (place, keywords) in OBSERVATIONS_ABOVE.items()},
     "frame30": partial(FrameCamera, 30.0),
     "frame1000": partial(FrameCamera, 1000.0),
+    "events": EventCounts,
 }
 
 

@@ -12,7 +12,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from math import floor
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from gymnasium import spaces
@@ -73,8 +73,7 @@ class FrameCamera(Observation):
     def step(self, blocks: Blocks, state: Shutter) -> tuple[NDArray[np.uint8], Shutter]:
         if not len(blocks.light):
             raise InputError("a frame camera needs the light on the sensor, which this environment does not know")
-        period = blocks.frame_rate_hz / self.rate_hz
-        exposure = period if self.exposure_s is None else self.exposure_s * blocks.frame_rate_hz
+        period, exposure = self._frames(blocks.frame_rate_hz)
         after = Shutter._make(array.copy() for array in state)
         for own, light in zip(_streams(after), blocks.light, strict=True):
             start, stop = float(own.now), float(own.now) + blocks.spikes.shape[1]
@@ -86,6 +85,24 @@ class FrameCamera(Observation):
                     own.end[...] = end
             own.now[...] = stop
         return after.picture.copy(), after
+
+    def info(self, blocks: Blocks, state: Shutter) -> list[dict[str, Any]]:
+        """As of `Observation`: a byte a pixel and whole exposure of the step."""
+        period, exposure = self._frames(blocks.frame_rate_hz)
+        pixels = state.picture[0].size
+        return [
+            {
+                "camera_bits": 8.0
+                * pixels
+                * sum(whole for *_, whole in shutter_open(now - blocks.frames, now, period, exposure))
+            }
+            for now in state.now.tolist()
+        ]
+
+    def _frames(self, frame_rate_hz: float) -> tuple[float, float]:
+        """Period and exposure [frames]."""
+        period = frame_rate_hz / self.rate_hz
+        return period, period if self.exposure_s is None else self.exposure_s * frame_rate_hz
 
     def age(self, state: Shutter) -> NDArray[np.float64]:
         return np.where(state.end < 0, -1.0, state.now - state.end)

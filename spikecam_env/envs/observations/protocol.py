@@ -45,6 +45,13 @@ class Blocks:
     light: Sequence[Keyframes | ArrayLike] = ()
     """N, the light on each sensor, on the frames of its episode; empty where it is not known."""
     frame_rate_hz: float = 40_000.0
+    seeds: Sequence[int] = ()
+    """N, of the cameras in this episode; empty where they are not known, which is as 0."""
+
+    @property
+    def frames(self) -> int:
+        """K, of each block."""
+        return int(self.spikes.shape[1])
 
 
 class Observation(ABC):
@@ -71,6 +78,20 @@ class Observation(ABC):
     def age(self, state: Any) -> NDArray[np.float64] | float:
         """(N,) age of the newest light in the picture [frames]; -1 before the first valid picture."""
         return 0.0
+
+    def info(self, blocks: Blocks, state: Any) -> list[dict[str, Any]]:
+        """What infos of this step say of the camera, a dictionary a stream.
+
+        Args:
+            blocks: of the step.
+            state: after it.
+
+        Returns:
+            `camera_bits`, bits that the camera sent in the step: of a spike camera, one a pixel and frame; and more of
+            a law's own.
+        """
+        streams, frames, rows, columns = blocks.spikes.shape
+        return [{"camera_bits": float(frames * rows * columns)} for _ in range(streams)]
 
 
 def restarted(law: Observation, view: CameraView, state: Any, which: Masks) -> Any:

@@ -10,6 +10,7 @@ knows; on vectors it is had by `obs=`.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import gymnasium
@@ -59,7 +60,8 @@ class ObserveSpikes(gymnasium.ObservationWrapper, gymnasium.utils.RecordConstruc
         """The observation of a block."""
         if self._state is None:
             raise NotReadyError("the environment has not begun; call reset first")
-        blocks = Blocks(observation[None], light_on(self.env), self._view.frame_rate_hz)
+        light, seeds = light_on(self.env)
+        blocks = Blocks(observation[None], light, self._view.frame_rate_hz, seeds)
         picture, self._state = self._law.step(blocks, self._state)
         return picture[0]
 
@@ -119,7 +121,7 @@ def viewed(space: spaces.Space[Any], env: Any) -> CameraView:
     return CameraView((rows, columns), frames, rate)
 
 
-def light_on(env: gymnasium.Env) -> tuple[Keyframes | ArrayLike, ...]:
-    """The light on the sensor in the last step; empty where the environment is no spike camera."""
+def light_on(env: gymnasium.Env) -> tuple[Sequence[Keyframes | ArrayLike], Sequence[int]]:
+    """The light on the sensor in the last step, and the camera's seed; both empty where it is no spike camera's."""
     one = env.unwrapped
-    return tuple(one.blocks.light) if isinstance(one, SpikeCameraEnv) else ()
+    return (one.blocks.light, one.blocks.seeds) if isinstance(one, SpikeCameraEnv) else ((), ())
