@@ -93,8 +93,10 @@ class Agents:
             imitate=self.imitate,
         )
         results = study(wanted, self.out, points=self.points, jobs=self.jobs, ray=self.ray)
-        written = ["record.jsonl", *self._tables(results), "curves.png"]
-        draw_curves(results, self.out / "curves.png")
+        written = ["record.jsonl", *self._tables(results)]
+        if self.points:
+            draw_curves(results, self.out / "curves.png")
+            written.append("curves.png")
         if self.intervals:
             draw_over_light(results, self.out / "light.png")
             written.append("light.png")
