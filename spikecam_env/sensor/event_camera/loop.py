@@ -89,12 +89,14 @@ def leaked(level: float, leak: float, time: float) -> float:
 
 
 @njit(cache=True, error_model="numpy")
-def rising(line: Line, level: float, leak: float, since: float, start: float) -> float:
-    """The first moment at which light is up to the level; NEVER where that is not before the line's end."""
-    if line.slope < 0.0:
-        jump = jumped_at(line, since, start)
-        if jump < NEVER and at(line, jump) >= leaked(level, leak, jump - since):
-            return jump
+def rising(line: Line, level: float, leak: float, since: float, jump: float) -> float:
+    """The first moment at which light is up to the level; NEVER where that is not before the line's end.
+
+    Args:
+        jump: when light that falls may be up to it all the same; NEVER where it cannot.
+    """
+    if line.slope < 0.0 and jump < NEVER and at(line, jump) >= leaked(level, leak, jump - since):
+        return jump
     begin = max(line.begin, since)
     if line.slope >= 0.0 and at(line, begin) >= leaked(level, leak, begin - since):
         return begin
@@ -120,10 +122,13 @@ def rising(line: Line, level: float, leak: float, since: float, start: float) ->
 
 
 @njit(cache=True, error_model="numpy")
-def falling(line: Line, level: float, leak: float, since: float, start: float) -> float:
-    """The first moment at which light is down at the level; NEVER where that is not before the line's end."""
+def falling(line: Line, level: float, leak: float, since: float, jump: float) -> float:
+    """The first moment at which light is down at the level; NEVER where that is not before the line's end.
+
+    Args:
+        jump: when light that rises may be down at it all the same; NEVER where it cannot.
+    """
     if line.slope > 0.0:
-        jump = jumped_at(line, since, start)
         return jump if jump < NEVER and at(line, jump) <= leaked(level, leak, jump - since) else NEVER
     begin = max(line.begin, since)
     if at(line, begin) <= leaked(level, leak, begin - since):
@@ -141,10 +146,13 @@ def falling(line: Line, level: float, leak: float, since: float, start: float) -
 
 
 @njit(inline="always")
-def jumped_at(line: Line, since: float, start: float) -> float:
-    """When light may be beyond a threshold against its slope: where it jumped, at the line's begin or the call's."""
+def jumped_at(line: Line, since: float, start: float, was_opposite: bool) -> float:
+    """When light may be beyond a threshold against its slope: where it jumped, at the line's begin or the call's.
+
+    After an event there the other way it is not: the rounding of a time on a steep line would be taken for a jump.
+    """
     jump = max(line.begin, start)
-    return jump if since <= line.begin or since < jump else NEVER
+    return jump if since < jump or (since == jump and not was_opposite) else NEVER
 
 
 @njit(inline="always")
@@ -203,6 +211,7 @@ def crossing(
     on: float,
     off: float,
     leak: float,
+    last: int,
 ) -> tuple[float, int]:
     """When light next crosses a threshold, and its polarity, 1 or -1; (NEVER, 0) where it does not before a moment.
 
@@ -211,12 +220,13 @@ def crossing(
     Args:
         high: light at the line's end.
         start: of the call; light may have jumped there.
+        last: polarity of the event before on this line and in this call, or 0.
     """
     lowest = reference * on * (1.0 - leak * (before - since)) * SAFETY
     if max(line.level, high) < lowest and min(line.level, high) * SAFETY > reference * off:
         return NEVER, 0
-    rise = rising(line, reference * on, leak, since, start)
-    fall = falling(line, reference * off, leak, since, start)
+    rise = rising(line, reference * on, leak, since, jumped_at(line, since, start, last < 0))
+    fall = falling(line, reference * off, leak, since, jumped_at(line, since, start, last > 0))
     return (fall, -1) if fall < rise else (rise, 1)
 
 
@@ -253,13 +263,13 @@ def expose(
             on, off = thresholds.on[p], thresholds.off[p]
             reference, since, noise, drawn = pixels.reference[p], pixels.since[p], pixels.noise[p], pixels.drawn[p]
             line, at_end = line_of(keys, radiance, key, p, law.dark)
-            before = min(line.end, stop)
+            before, last = min(line.end, stop), 0
             while True:
                 t, polarity = NEVER, 0
                 if since < before:
                     if reference < 0.0:
                         reference = -reference * at(line, max(since, line.begin))
-                    t, polarity = crossing(line, at_end, start, before, reference, since, on, off, law.leak)
+                    t, polarity = crossing(line, at_end, start, before, reference, since, on, off, law.leak, last)
                     t = max(t, start)  # where light is not the same as in the call before
                 is_noise = noise < min(t, before)
                 if is_noise:
@@ -275,7 +285,7 @@ def expose(
                     places = np.concatenate((places, np.empty_like(places)))
                     rose = np.concatenate((rose, np.empty_like(rose)))
                 times[used], places[used], rose[used] = t, p, polarity > 0
-                used += 1
+                used, last = used + 1, polarity
                 held = t + law.refractory
                 if held > t:
                     reference = -1.0
