@@ -27,7 +27,7 @@ from spikecam_env.sensor import Keyframes
 from spikecam_env.types import Masks, Pictures
 
 SCENES = ("tumble", "text", "dice", "disk")
-"""Bodies that pass before each other; letters on a drum and a disk; falling dice, that cover each other; a flat disk."""
+"""Bodies that pass before each other; letters on a drum and a disk; dice that cover each other; a flat disk."""
 GAPS = (10, 20, 40)
 """Frames from picture to picture."""
 START, FRAMES = 1000, 40
