@@ -31,8 +31,8 @@ REACH = 0.75
 between two pictures has no holes."""
 
 REFINEMENTS = 1
-"""Steps of the search for the place of a picture that comes to a pixel's centre, from one that comes within REACH.  More
-give the same error."""
+"""Steps of the search for the place of a picture that comes to a pixel's centre, from one that comes within
+REACH.  More give the same error."""
 
 NO_POINT = -1
 """Number of the point at a pixel where none comes."""
