@@ -19,7 +19,15 @@ from gymnasium.vector import AutoresetMode
 from gymnasium.vector.utils import batch_space
 from numpy.typing import ArrayLike, NDArray
 
-from spikecam_env.envs.observations import Blocks, CameraView, Observation, block_shape, observation, restarted
+from spikecam_env.envs.observations import (
+    Blocks,
+    CameraView,
+    Observation,
+    ObservedStream,
+    block_shape,
+    observation,
+    restarted,
+)
 from spikecam_env.envs.spike_camera import SpikeCameraEnv
 from spikecam_env.errors import InputError, NotReadyError
 from spikecam_env.sensor import Keyframes
@@ -47,21 +55,18 @@ class ObserveSpikes(gymnasium.ObservationWrapper, gymnasium.utils.RecordConstruc
     def __init__(self, env: gymnasium.Env, obs: str | Observation) -> None:
         gymnasium.utils.RecordConstructorArgs.__init__(self, obs=obs)
         super().__init__(env)
-        self._law, self._view, self._state = observation(obs), viewed(env.observation_space, env), None
-        self.observation_space = self._law.space(self._view)
+        self._view = viewed(env.observation_space, env)
+        self._observed = ObservedStream(observation(obs), self._view)
+        self.observation_space = self._observed.space
 
     def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[Any, dict[str, Any]]:
         """Begin an episode, and with it another stream."""
-        self._state = self._law.start(self._view, 1)
+        self._observed.begin()
         return super().reset(seed=seed, options=options)
 
     def observation(self, observation: NDArray[Any]) -> Any:
         """The observation of a block."""
-        if self._state is None:
-            raise NotReadyError("the environment has not begun; call reset first")
-        blocks = Blocks(observation[None], light_on(self.env), self._view.frame_rate_hz)
-        picture, self._state = self._law.step(blocks, self._state)
-        return picture[0]
+        return self._observed.step(Blocks(observation[None], light_on(self.env), self._view.frame_rate_hz))[0]
 
 
 class VectorObserveSpikes(gymnasium.vector.VectorObservationWrapper):
