@@ -50,6 +50,10 @@ class ObservedStream:
         """Give back the memory of the episode."""
         self._state = None
 
+    def skip(self, blocks: Blocks) -> None:
+        """Pass a block of any length through the law's memory; its picture is not observed."""
+        self._state = self.law.step(blocks, self._begun())[1]
+
     def step(self, blocks: Blocks, gaze: ArrayLike | None = None) -> tuple[Any, float]:
         """The observation after one more block.
 
@@ -64,14 +68,17 @@ class ObservedStream:
             NotReadyError: before `begin`.
             OwnCodeError: for a law whose picture is not one of its space.
         """
-        if self._state is None:
-            raise NotReadyError("the environment has not begun; call reset first")
-        picture, self._state = self.law.step(blocks, self._state)
+        picture, self._state = self.law.step(blocks, self._begun())
         check_picture(picture, self._picture_space, self.law)
         age = float(np.asarray(self.law.age(self._state)).reshape(-1)[0])
         if not self.obs_state:
             return picture[0], age
         return {name: array[0] for name, array in with_state(picture, gaze, age).items()}, age
+
+    def _begun(self) -> Any:
+        if self._state is None:
+            raise NotReadyError("the environment has not begun; call reset first")
+        return self._state
 
 
 def check_picture(picture: Any, space: spaces.Space[Any], law: Observation) -> None:
