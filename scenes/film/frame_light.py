@@ -16,12 +16,12 @@ class FrameLight:
         self, shape: tuple[int, int], frame_rate_hz: float, transfer: str | float = "srgb", scale: float = 1.0
     ) -> None:
         self.shape, self.frame_rate_hz, self.scale = shape, frame_rate_hz, scale
-        self._curve = curve(transfer if isinstance(transfer, str) else f"gamma{transfer}")
+        self._transfer = transfer if isinstance(transfer, str) else f"gamma{transfer}"
         self._last: Keyframes | None = None
 
     def add(self, time_s: float, frame: NDArray[np.float32]) -> Keyframes:
         """Light up to this time."""
-        light = (self._curve(frame) * np.float32(self.scale)).astype(np.float32)
+        light = (curve(self._transfer)(frame) * np.float32(self.scale)).astype(np.float32)
         now = Keyframes(np.array([round(time_s * self.frame_rate_hz, 6)]), light[None])
         last, self._last = self._last, now
         if last is None:

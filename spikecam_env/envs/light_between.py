@@ -38,6 +38,9 @@ class LightBetween(Protocol):
     def step(self, frame: int) -> Keyframes:
         """Light after a step of the simulator, from the last frame given up to this one."""
 
+    def close(self) -> None:
+        """Give back what it holds; may be called again."""
+
 
 MakeLight = Callable[[gymnasium.Env[Any, Any], CameraView], LightBetween]
 """(environment, camera) -> its light; called once, when the camera is put before the environment."""
@@ -80,6 +83,10 @@ class RenderedLight:
             raise InputError(f"the picture is {picture.shape}, the one before {self._size}; render one size an episode")
         self._size = picture.shape
         return self._film.add(frame / self._view.frame_rate_hz, light_on(picture, self._view.shape, self._transfer))
+
+    def close(self) -> None:
+        """See `LightBetween.close`; the environment is the caller's to close."""
+        self._film = self._new_film()
 
     def _new_film(self) -> FrameLight:
         return FrameLight(self._view.shape, self._view.frame_rate_hz, transfer="linear", scale=1.0)

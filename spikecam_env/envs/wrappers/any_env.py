@@ -177,6 +177,7 @@ class SpikeCamera(gymnasium.Wrapper[Any, Any, Any, Any], gymnasium.utils.RecordC
         """Close the environment, and give back the sensor; may be called again."""
         self._sensor = self._blocks = None
         self._observed.end()
+        self._light_between.close()
         super().close()
 
     @property

@@ -29,6 +29,7 @@ from spikecam_env.envs.observations import (
     restarted,
 )
 from spikecam_env.envs.spike_camera import SpikeCameraEnv
+from spikecam_env.envs.wrappers.any_env import spike_camera_of
 from spikecam_env.errors import InputError, NotReadyError
 from spikecam_env.sensor import Keyframes
 
@@ -119,12 +120,12 @@ def viewed(space: spaces.Space[Any], env: Any) -> CameraView:
         InputError: where they are no blocks of spikes.
     """
     frames, rows, columns = block_shape(space)
-    one = getattr(env.unwrapped, "envs", [env])[0].unwrapped
-    rate = one.model.frame_rate_hz if isinstance(one, SpikeCameraEnv) else CameraView.frame_rate_hz
+    camera = spike_camera_of(getattr(env.unwrapped, "envs", [env])[0])
+    rate = CameraView.frame_rate_hz if camera is None else camera.model.frame_rate_hz
     return CameraView((rows, columns), frames, rate)
 
 
 def light_on(env: gymnasium.Env) -> tuple[Keyframes | ArrayLike, ...]:
-    """The light on the sensor in the last step; empty where the environment is no spike camera."""
-    one = env.unwrapped
-    return tuple(one.blocks.light) if isinstance(one, SpikeCameraEnv) else ()
+    """The light on the sensor in the last step; empty where it is not known, or of frames beside the block."""
+    camera = spike_camera_of(env)
+    return tuple(camera.blocks.light) if isinstance(camera, SpikeCameraEnv) else ()
