@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from denoiser.online import OnlineDnSS
 from denoiser.passes.recipe import RECIPES
-from spikecam_env.envs.observations import block_shape
+from spikecam_env.envs.wrappers.observe import viewed
 from spikecam_env.errors import InputError, NotReadyError, unknown_name
 
 OUTPUTS = ("spikes", "rate")
@@ -61,7 +61,7 @@ class DenoiseObservation(gymnasium.Wrapper, gymnasium.utils.RecordConstructorArg
             raise unknown_name("output", output, OUTPUTS)
         if not isinstance(warm_up, str) or warm_up not in WARM_UPS:
             raise unknown_name("warm_up", warm_up, WARM_UPS)
-        block_shape(space)
+        viewed(space, env)
         self._denoiser: OnlineDnSS | None = _denoiser(mode, output)
         self._type = space.dtype if output == "spikes" else np.dtype(np.float32)
         self._warm_up = warm_up

@@ -13,6 +13,7 @@ import pytest
 from gymnasium import spaces
 from gymnasium.utils.env_checker import check_env
 
+from denoiser import DenoiseObservation
 from spikecam_env.envs.observations import TFP
 from spikecam_env.envs.registration import register
 from spikecam_env.envs.wrappers import ObserveSpikes, RandomizeLight, RandomizeSensor, SpikeCamera
@@ -200,8 +201,16 @@ def test_our_other_wrappers_take_it() -> None:
     sensors = RandomizeSensor(camera(model="ideal"), {"dead_time.tau_us": (0.5, 2.0)})
     sensors.reset(seed=0)
     assert [effect.name for effect in sensors.env.sensor.model.effects] == ["dead_time"]  # type: ignore[attr-defined]
-    for a, b in zip(played(ObserveSpikes(camera("spikes"), "tfp")), played(camera("tfp")), strict=True):
+
+
+@pytest.mark.parametrize("obs", ["tfp", "tfi", "frame1000"])
+def test_whole_steps_of_spikes_may_be_observed_by_another_wrapper(obs: str) -> None:
+    whole = {"block_frames": FRAMES}
+    for a, b in zip(played(ObserveSpikes(camera("spikes", **whole), obs)), played(camera(obs, **whole)), strict=True):
         np.testing.assert_array_equal(a, b)
+    for wrapped in (partial(ObserveSpikes, obs=obs), DenoiseObservation):
+        with pytest.raises(InputError, match=r"shows 40 of the 100 frames of a step.*give obs= to SpikeCamera itself"):
+            wrapped(camera("spikes"))
 
 
 class Lamp:
@@ -311,6 +320,14 @@ def test_a_picture_that_changes_its_size_and_a_black_one_are_named() -> None:
         env.step(0)
     with pytest.raises(InputError, match=r"the first picture is black.*give scale"):
         camera(bar={"show": np.zeros(SIZE)}, mean_interval=10.0).reset()
+
+
+def test_other_things_than_one_environment_and_other_seeds_are_named() -> None:
+    for env in (None, "CartPole-v1", gymnasium.make_vec("CartPole-v1", 2, "sync", render_mode="rgb_array")):
+        with pytest.raises(InputError, match=r"env = .*; give one environment, and for vectors make_vec"):
+            SpikeCamera(env)  # type: ignore[arg-type]
+    with pytest.raises(InputError, match="seed = -1"):
+        camera().reset(seed=-1)
 
 
 def test_calls_in_the_wrong_order_are_named() -> None:

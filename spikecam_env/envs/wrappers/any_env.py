@@ -21,7 +21,14 @@ import numpy as np
 from gymnasium import spaces
 
 from scenes.exposure import checked_interval
-from spikecam_env.checked import checked_count, checked_memory, checked_number, checked_shape, checked_switch
+from spikecam_env.checked import (
+    checked_count,
+    checked_memory,
+    checked_number,
+    checked_seed,
+    checked_shape,
+    checked_switch,
+)
 from spikecam_env.envs.light_between import MakeLight, RenderedLight
 from spikecam_env.envs.observations import Blocks, CameraView, Observation, ObservedStream, observation
 from spikecam_env.envs.reset_options import camera_options, loaded_model
@@ -126,6 +133,8 @@ class SpikeCamera(gymnasium.Wrapper[Any, Any, Any, Any], gymnasium.utils.RecordC
             engine=engine,
             threads=threads,
         )
+        if not isinstance(env, gymnasium.Env):
+            raise InputError(f"env = {shown(env)}; give one environment, and for vectors make_vec(..., wrappers=[...])")
         super().__init__(env)
         self.shape, self.model = checked_shape(shape), loaded_model(model)
         self.step_s = (
@@ -155,9 +164,10 @@ class SpikeCamera(gymnasium.Wrapper[Any, Any, Any, Any], gymnasium.utils.RecordC
         self._open()
         self._blocks = None  # after a reset that fails nothing can be stepped
         model, self._light_factor, others = camera_options(options, self.model)
-        inner, info = self.env.reset(seed=seed, options=others or None)
         if seed is not None:
+            seed = checked_seed(seed)
             self._rng = generator(seed, "spike camera of a simulator")
+        inner, info = self.env.reset(seed=seed, options=others or None)
         self._sensor = self._unit_of(model, int(self._rng.integers(2**31)))
         self._observed.begin()
         self._steps = 1

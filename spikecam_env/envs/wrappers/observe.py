@@ -28,7 +28,6 @@ from spikecam_env.envs.observations import (
     observation,
     restarted,
 )
-from spikecam_env.envs.spike_camera import SpikeCameraEnv
 from spikecam_env.envs.wrappers.any_env import spike_camera_of
 from spikecam_env.errors import InputError, NotReadyError
 from spikecam_env.sensor import Keyframes
@@ -117,15 +116,20 @@ def viewed(space: spaces.Space[Any], env: Any) -> CameraView:
     """The camera whose blocks fill a space.
 
     Raises:
-        InputError: where they are no blocks of spikes.
+        InputError: where they are no blocks of spikes, or not all frames of a step.
     """
     frames, rows, columns = block_shape(space)
     camera = spike_camera_of(getattr(env.unwrapped, "envs", [env])[0])
+    if camera is not None and camera.frames_per_step != frames:
+        raise InputError(
+            f"the camera shows {frames} of the {camera.frames_per_step:g} frames of a step, and a law of spikes needs "
+            "all; give obs= to SpikeCamera itself, or block_frames= of the whole step"
+        )
     rate = CameraView.frame_rate_hz if camera is None else camera.model.frame_rate_hz
     return CameraView((rows, columns), frames, rate)
 
 
 def light_on(env: gymnasium.Env) -> tuple[Keyframes | ArrayLike, ...]:
-    """The light on the sensor in the last step; empty where it is not known, or of frames beside the block."""
+    """The light on the sensor in the last step; empty where the environment has no spike camera."""
     camera = spike_camera_of(env)
-    return tuple(camera.blocks.light) if isinstance(camera, SpikeCameraEnv) else ()
+    return () if camera is None else tuple(camera.blocks.light)
