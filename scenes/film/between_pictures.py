@@ -1,0 +1,98 @@
+"""The interval between two pictures of a stream: when its keys lie, and the light at each.
+
+motion unknown    light is linear in time; keys at the whole frames next to both pictures
+motion known      light is carried along it (`along_motion.py`); keys also between, so that little moves from key to key
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from scenes.film.along_motion import MovingPicture, lay_between
+from scenes.film.given_picture import GivenPicture
+from scenes.film.point_paths import fastest, moving_pictures, with_outlines
+from scenes.keys import interval_for
+from spikecam_env.types import Floats, Pictures
+
+Motions = tuple[Pictures | None, Pictures | None]
+"""Motion (h, w, 2) of the earlier and of the later picture [pixels over the interval]."""
+
+
+@dataclass(frozen=True, eq=False)
+class Interval:
+    """Light from one picture to the next."""
+
+    before: GivenPicture
+    after: GivenPicture
+    moving: tuple[MovingPicture, MovingPicture] | None
+    """Both with the paths of their points; None where the motion is unknown."""
+
+    @classmethod
+    def between(cls, before: GivenPicture, after: GivenPicture, step: float | None, motion_is: str) -> Interval:
+        """The interval of two pictures.
+
+        Args:
+            before: the earlier picture.
+            after: the later picture.
+            step: from the picture before the earlier one [frames]; None where that is the first.
+            motion_is: as of `FrameLight`.
+        """
+        motions = _over_interval(before, after, step, motion_is)
+        if motions[0] is None and motions[1] is None:
+            return cls(before, after, None)
+        nears = before.near, after.near
+        if nears[0] is None or nears[1] is None:
+            flat = np.ones_like(before.light)
+            sides = motions, (flat, flat)
+        else:
+            first, second = _outlined(motions[0], nears[0]), _outlined(motions[1], nears[1])
+            sides = (first[0], second[0]), (first[1], second[1])
+        return cls(before, after, moving_pictures((before.light, after.light), *sides, motion_is))
+
+    def key_frames(self, motion_per_key: float) -> Floats:
+        """Whole frames (K,) from the one after the earlier picture to the one before the later; none within a frame.
+
+        Args:
+            motion_per_key: largest motion from one to the next [pixels of the pictures], as far as whole frames allow.
+        """
+        first, last = int(np.ceil(self.before.at)), int(np.floor(self.after.at))
+        if first > last:
+            return np.empty(0)
+        inner = range(0)
+        if self.moving is not None:
+            step = interval_for(fastest(self.moving) / (self.after.at - self.before.at), motion_per_key)
+            inner = range((first // step + 1) * step, last, step)
+        return np.unique([first, *inner, last]).astype(np.float64)
+
+    def at(self, frame: float) -> Pictures:
+        """Light (h, w) at a frame; the pictures themselves at their own times."""
+        before, after = self.before, self.after
+        share = np.float32((frame - before.at) / (after.at - before.at))
+        if self.moving is None or share in (0, 1):
+            return np.asarray(before.light * (np.float32(1) - share) + after.light * share)
+        light = np.empty_like(before.light)
+        lay_between(*self.moving, share, light)
+        return light
+
+
+def _over_interval(before: GivenPicture, after: GivenPicture, step: float | None, motion_is: str) -> Motions:
+    """Motion of both pictures, in pixels over the interval; both None where it does not say how points move in it."""
+    span = after.at - before.at
+    if motion_is == "to_next":
+        return (before.motion, after.motion) if before.motion is not None else (None, None)
+    if motion_is == "since_last":
+        earlier = _times(before.motion, span / step) if step else None
+        return (earlier, after.motion) if after.motion is not None else (None, None)
+    return _times(before.motion, span), _times(after.motion, span)
+
+
+def _times(motion: Pictures | None, factor: Any) -> Pictures | None:
+    return None if motion is None else np.asarray(motion * np.float32(factor))
+
+
+def _outlined(motion: Pictures | None, near: Pictures) -> tuple[Pictures | None, Pictures]:
+    """See `with_outlines`; the picture's depth where its motion is unknown."""
+    return (None, near) if motion is None else with_outlines(motion, near)
