@@ -11,15 +11,16 @@ gives exact light by another class with the same two methods (`SpikeCamera(env, 
 from __future__ import annotations
 
 from collections.abc import Callable
+from math import floor
 from typing import Any, Protocol
 
 import cv2
 import gymnasium
 import numpy as np
-from numpy.typing import NDArray
 
 from scenes.film.frame_light import FrameLight
-from scenes.film.transfer import curve, grey, light_of
+from scenes.film.given_picture import linear_light
+from scenes.film.transfer import curve
 from spikecam_env.envs.observations import CameraView
 from spikecam_env.errors import InputError, shown
 from spikecam_env.sensor import Keyframes
@@ -29,13 +30,14 @@ from spikecam_env.types import Pictures
 class LightBetween(Protocol):
     """Light on the camera's pixels from one step of a simulator to the next; 1.0 is white.
 
-    Frames are those of the episode, whole numbers; a step's light may begin with the key that the last one ended with.
+    Frames are those of the episode; the camera exposes whole ones, up to the last that is over.  A step's light begins
+    with the key that the last one ended with.
     """
 
-    def begin(self, frame: int) -> Keyframes:
-        """Light after a reset, up to this frame."""
+    def begin(self, frame: float) -> Keyframes:
+        """Light after a reset, up to this frame: a still picture."""
 
-    def step(self, frame: int) -> Keyframes:
+    def step(self, frame: float) -> Keyframes:
         """Light after a step of the simulator, from the last frame given up to this one."""
 
     def close(self) -> None:
@@ -68,35 +70,36 @@ class RenderedLight:
         self._env, self._view = env, view
         self._transfer = transfer if isinstance(transfer, str) else f"gamma{transfer:g}"
         curve(self._transfer)
+        self._film = FrameLight(view.shape, view.frame_rate_hz, transfer="linear", scale=1.0)
         self._size: tuple[int, ...] | None = None
-        self._film = self._new_film()
 
-    def begin(self, frame: int) -> Keyframes:
+    def begin(self, frame: float) -> Keyframes:
         """See `LightBetween.begin`."""
-        self._size, self._film = None, self._new_film()
-        return self.step(frame)
+        self._size = None
+        self._film.reset(floor(frame))
+        return self.step(floor(frame))
 
-    def step(self, frame: int) -> Keyframes:
+    def step(self, frame: float) -> Keyframes:
         """See `LightBetween.step`."""
-        picture = _checked(self._env.render())
-        if picture.shape != (self._size or picture.shape):
-            raise InputError(f"the picture is {picture.shape}, the one before {self._size}; render one size an episode")
-        self._size = picture.shape
-        return self._film.add(frame / self._view.frame_rate_hz, light_on(picture, self._view.shape, self._transfer))
+        picture = self._env.render()
+        light = light_on(picture, self._view.shape, self._transfer)
+        if np.shape(picture) != (self._size or np.shape(picture)):
+            raise InputError(
+                f"render() returned a picture {np.shape(picture)}, the one before is {self._size}; render one size"
+            )
+        self._size = np.shape(picture)
+        return self._film.add(frame / self._view.frame_rate_hz, light)
 
     def close(self) -> None:
-        """See `LightBetween.close`; the environment is the caller's to close."""
-        self._film = self._new_film()
-
-    def _new_film(self) -> FrameLight:
-        return FrameLight(self._view.shape, self._view.frame_rate_hz, transfer="linear", scale=1.0)
+        """See `LightBetween.close`; the environment is its owner's to close."""
+        self._film.reset()
 
 
-def light_on(picture: NDArray[Any], shape: tuple[int, int], transfer: str) -> Pictures:
+def light_on(picture: Any, shape: tuple[int, int], transfer: str) -> Pictures:
     """A rendered picture as light on pixels.
 
     Args:
-        picture: (h, w) or (h, w, 3: red, green, blue), whole numbers of full scale or floats of which 1 is white.
+        picture: (h, w) or (h, w, 3: red, green, blue); uint8, uint16, or floats with white at 1.
         shape: (rows, columns) of the pixels; the whole picture falls on them, each averages the light of its area.
         transfer: as `scenes.film.transfer` names it.
 
@@ -104,30 +107,18 @@ def light_on(picture: NDArray[Any], shape: tuple[int, int], transfer: str) -> Pi
         Luminance (rows, columns) float32, 1.0 is white.
 
     Raises:
-        InputError: for values that are no light.
+        InputError: for anything else, and for values that are no light.
 
     Example:
         >>> light_on(np.array([[0, 255], [255, 255]], np.uint8), (1, 1), "srgb").tolist()
         [[0.75]]
     """
-    where = "the rendered picture"
-    if picture.dtype == np.uint8:  # 256 values: a table takes a tenth of the time
-        codes = light_of(np.arange(256, dtype=np.float32) / np.float32(255), transfer, where)
-        linear = np.asarray(cv2.LUT(picture, codes), np.float32)
-    else:
-        linear = light_of(picture.astype(np.float32), transfer, where)
-    pixels = cv2.resize(linear, shape[::-1], interpolation=cv2.INTER_AREA)
-    return np.ascontiguousarray(grey(np.asarray(pixels, np.float32).reshape(*shape, *picture.shape[2:])), np.float32)
-
-
-def _checked(picture: Any) -> NDArray[Any]:
-    """A picture that a simulator rendered; InputError for anything else."""
-    if not isinstance(picture, np.ndarray):
-        raise InputError(f"render() returned {shown(picture)}; it must return an array (h, w) or (h, w, 3)")
-    if picture.ndim not in (2, 3) or picture.size == 0 or (picture.ndim == 3 and picture.shape[2] != 3):
-        raise InputError(
-            f"render() returned an array {picture.shape}; it must be (h, w) or (h, w, 3: red, green, blue)"
-        )
-    if picture.dtype != np.uint8 and picture.dtype.kind != "f":
-        raise InputError(f"render() returned {picture.dtype}; it must be uint8, or floats of which 1 is white")
-    return picture
+    if not isinstance(picture, np.ndarray) or picture.ndim not in (2, 3) or picture.size == 0:
+        found = f"an array {picture.shape}" if isinstance(picture, np.ndarray) else shown(picture)
+        raise InputError(f"render() returned {found}; it must return an array (h, w) or (h, w, 3: red, green, blue)")
+    rows, columns = picture.shape[:2]
+    try:
+        light = linear_light(picture, (rows, columns), transfer, "luminance")
+    except InputError as error:
+        raise InputError(f"render() returned a picture that is none: {error}") from error
+    return np.asarray(cv2.resize(light, shape[::-1], interpolation=cv2.INTER_AREA), np.float32).reshape(shape)

@@ -219,10 +219,10 @@ class Lamp:
     def __init__(self, env: Any, view: Any) -> None:
         self.shape = view.shape
 
-    def begin(self, frame: int) -> Keyframes:
+    def begin(self, frame: float) -> Keyframes:
         return self.step(frame)
 
-    def step(self, frame: int) -> Keyframes:
+    def step(self, frame: float) -> Keyframes:
         keys = np.array([max(0, frame - FRAMES), frame], np.float64)
         return Keyframes(keys, np.broadcast_to(keys[:, None, None] / 1e3, (2, *self.shape)).astype(np.float32))
 
@@ -298,12 +298,13 @@ def test_wrong_arguments_are_named(bar: dict[str, Any], options: dict[str, Any],
 @pytest.mark.parametrize(
     "show, message",
     [
-        ("a picture", "render.. returned 'a picture'; it must return an array"),
-        (np.zeros((*SIZE, 4), np.uint8), r"render.. returned an array \(12, 16, 4\)"),
-        (np.zeros((0, 3), np.uint8), "render.. returned an array"),
-        (np.zeros(SIZE, np.int64), "render.. returned int64; it must be uint8, or floats"),
-        (np.full(SIZE, np.nan), "the rendered picture: its values run from nan to nan"),
-        (np.full(SIZE, 200.0), "the rendered picture: its values run from 200 to 200"),
+        ("a picture", r"render\(\) returned 'a picture'; it must return an array"),
+        (np.zeros(3, np.uint8), r"render\(\) returned an array \(3,\)"),
+        (np.zeros((0, 3), np.uint8), r"render\(\) returned an array \(0, 3\)"),
+        (np.zeros((*SIZE, 4), np.uint8), r"returned a picture that is none: frame has shape \(12, 16, 4\)"),
+        (np.zeros(SIZE, np.int64), "returned a picture that is none: frame is int64"),
+        (np.full(SIZE, np.nan), "returned a picture that is none: frame: its values run from nan to nan"),
+        (np.full(SIZE, 200.0), "returned a picture that is none: frame: its values run from 200 to 200"),
     ],
     ids=str,
 )
@@ -316,7 +317,7 @@ def test_pictures_that_are_none_are_named(show: Any, message: str) -> None:
 def test_a_picture_that_changes_its_size_and_a_black_one_are_named() -> None:
     env = camera(bar={"show": lambda column: np.ones((4 + column, 4))})
     env.reset(options={"column": 0})
-    with pytest.raises(InputError, match=r"the picture is \(5, 4\), the one before \(4, 4\); render one size"):
+    with pytest.raises(InputError, match=r"a picture \(5, 4\), the one before is \(4, 4\); render one size"):
         env.step(0)
     with pytest.raises(InputError, match=r"the first picture is black.*give scale"):
         camera(bar={"show": np.zeros(SIZE)}, mean_interval=10.0).reset()

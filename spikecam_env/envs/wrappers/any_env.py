@@ -171,7 +171,7 @@ class SpikeCamera(gymnasium.Wrapper[Any, Any, Any, Any], gymnasium.utils.RecordC
         self._sensor = self._unit_of(model, int(self._rng.integers(2**31)))
         self._observed.begin()
         self._steps = 1
-        light = self._light_between.begin(self._last_frame)
+        light = self._light_between.begin(self._end)
         self._gain = self._light_factor * self._exposure(light)
         return self._seen(light, inner, info)
 
@@ -180,7 +180,7 @@ class SpikeCamera(gymnasium.Wrapper[Any, Any, Any, Any], gymnasium.utils.RecordC
         self._check_begun()
         inner, reward, terminated, truncated, info = self.env.step(action)
         self._steps += 1
-        observation, info = self._seen(self._light_between.step(self._last_frame), inner, info)
+        observation, info = self._seen(self._light_between.step(self._end), inner, info)
         return observation, reward, terminated, truncated, info
 
     def close(self) -> None:
@@ -210,14 +210,14 @@ class SpikeCamera(gymnasium.Wrapper[Any, Any, Any, Any], gymnasium.utils.RecordC
         return light
 
     @property
-    def _last_frame(self) -> int:
-        """Of the camera, at the end of this step."""
-        return floor(self._steps * self.frames_per_step + ROUNDING)
+    def _end(self) -> float:
+        """Of this step [frames]; the camera exposes the whole frames until then."""
+        return self._steps * self.frames_per_step
 
     def _seen(self, light: Keyframes, inner: Any, info: dict[str, Any]) -> tuple[Any, dict[str, Any]]:
         """The observation and info after the exposure of all frames of a step."""
         sensor, scaled = self._open(), Keyframes.known(light.frame, light.radiance * np.float32(self._gain))
-        for frames in _pieces(self._last_frame - sensor.frame - self.view.frames_per_step):
+        for frames in _pieces(floor(self._end + ROUNDING) - sensor.frame - self.view.frames_per_step):
             self._observed.skip(self._exposed(scaled, frames))
         self._blocks = self._exposed(scaled, self.view.frames_per_step)
         seen, age = self._observed.step(self._blocks)
