@@ -41,7 +41,7 @@ class LightBetween(Protocol):
         """Light after a step of the simulator, from the last frame given up to this one."""
 
     def close(self) -> None:
-        """Give back what it holds; may be called again."""
+        """Give back memory and contexts; may be called again."""
 
 
 MakeLight = Callable[[gymnasium.Env[Any, Any], CameraView], LightBetween]

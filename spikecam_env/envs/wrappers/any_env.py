@@ -51,7 +51,7 @@ ROUNDING = 1e-6
 
 
 class SpikeCamera(gymnasium.Wrapper[Any, Any, Any, Any], gymnasium.utils.RecordConstructorArgs):
-    """A spike camera sees the rendered pictures of an environment; its agent observes spikes, or what is made of them.
+    """A spike camera sees the rendered pictures of an environment, and the agent observes its spikes by a law.
 
     Actions, rewards and ends are the environment's.  Same seed of `reset`, same actions: same bits, and the states of
     the environment without a camera.  `sensor`, `blocks` and `light` are open to look at.
