@@ -1,77 +1,89 @@
 """How fast CartPole is with a spike camera before it, and where the time goes.
 
-    python -m benchmarks.any_env          one core; processor's time, so that other programs count little
+    python -m benchmarks.any_env          one core; the processor's time, so that other programs count little
 
-A step of CartPole is 20 ms: 800 frames of the camera.  `simulator` is the rules of CartPole and all else of a step.
+A step of CartPole is 20 ms, 800 frames of the camera.  light: from a picture to light on pixels; rest: the rules of
+CartPole, its wrappers and the camera's.
 """
 
 from __future__ import annotations
 
 import time
 from collections import defaultdict
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack, contextmanager
 from typing import Any
+from unittest.mock import patch
 
 import gymnasium
+from gymnasium.envs.classic_control import CartPoleEnv
 
 from spikecam_env.bench.machine import machine
 from spikecam_env.cli.table import table
 from spikecam_env.envs.light_between import RenderedLight
-from spikecam_env.envs.observations import CameraView
+from spikecam_env.envs.observations import ObservedStream
 from spikecam_env.envs.wrappers import SpikeCamera
+from spikecam_env.sensor import SpikeSensor
 
-STEPS = 100
-SHAPES = ((64, 64), (128, 128))
-LAWS = ("tfp", "tfi")
+STEPS = 50
+SHAPE = (64, 64)
+CASES = (("tfp", 40), ("tfi", 40), ("rate", 40), ("rate", 800))
+"""Observation, and frames of the observed block."""
+PARTS: dict[str, tuple[type, tuple[str, ...]]] = {
+    "render": (CartPoleEnv, ("render",)),
+    "light": (RenderedLight, ("step",)),
+    "sensor": (SpikeSensor, ("step",)),
+    "observation": (ObservedStream, ("step", "skip")),
+}
+"""Methods whose time is counted; that of light holds that of render."""
 
 
-def timed(function: Callable[..., Any], spent: dict[str, float], name: str) -> Callable[..., Any]:
-    """The function, whose processor's time [s] is added to `spent` under a name."""
+@contextmanager
+def timed(spent: dict[str, float]) -> Iterator[None]:
+    """Add the processor's time [s] of every part to `spent`."""
+    with ExitStack() as patches:
+        for part, (owner, names) in PARTS.items():
+            for name in names:
+                patches.enter_context(patch.object(owner, name, _timed(getattr(owner, name), spent, part)))
+        yield
 
+
+def _timed(function: Callable[..., Any], spent: dict[str, float], part: str) -> Callable[..., Any]:
     def call(*args: Any, **kwargs: Any) -> Any:
         begin = time.process_time()
-        try:
-            return function(*args, **kwargs)
-        finally:
-            spent[name] += time.process_time() - begin
+        result = function(*args, **kwargs)
+        spent[part] += time.process_time() - begin
+        return result
 
     return call
 
 
-def measured(obs: str, shape: tuple[int, int]) -> dict[str, Any]:
-    """A row: milliseconds of a step, and the shares of its parts."""
-    bare = gymnasium.make("CartPole-v1", render_mode="rgb_array")
-    spent: dict[str, float] = defaultdict(float)
-    bare.unwrapped.render = timed(bare.unwrapped.render, spent, "render")  # type: ignore[method-assign]
-
-    def timed_light(inner: Any, view: CameraView) -> RenderedLight:
-        light = RenderedLight(inner, view)
-        light.step = timed(light.step, spent, "light")  # type: ignore[method-assign]
-        return light
-
-    env = SpikeCamera(bare, obs, shape=shape, make_light=timed_light)
+def measured(obs: str, block_frames: int) -> dict[str, Any]:
+    """A row: steps a second, and milliseconds of a step by part."""
+    env = SpikeCamera(
+        gymnasium.make("CartPole-v1", render_mode="rgb_array"), obs, shape=SHAPE, block_frames=block_frames
+    )
     env.reset(seed=0)
     env.step(0)  # compiles
     env.reset(seed=0)
-    env.sensor.step = timed(env.sensor.step, spent, "sensor")  # type: ignore[method-assign]
-    spent.clear()
-    begin, steps = time.process_time(), 0
-    while steps < STEPS:
-        steps += 1
-        if env.step(steps % 2)[2]:
-            break
-    total = time.process_time() - begin
+    spent: dict[str, float] = defaultdict(float)
+    with timed(spent):
+        begin, steps, over = time.process_time(), 0, False
+        while steps < STEPS and not over:
+            over = env.step(steps % 2)[2]
+            steps += 1
+        total = time.process_time() - begin
     env.close()
-    own = {"render": spent["render"], "light": spent["light"] - spent["render"], "sensor": spent["sensor"]}
-    shares = {f"{name} [ms]": 1e3 * seconds / steps for name, seconds in own.items()}
-    rest = 1e3 * (total - sum(own.values())) / steps
-    return {"obs": obs, "shape": f"{shape[0]} x {shape[1]}", "steps/s": steps / total, **shares, "simulator [ms]": rest}
+    spent["light"] -= spent["render"]
+    own = {**{part: spent[part] for part in PARTS}, "rest": total - sum(spent.values())}
+    parts = {f"{part} [ms]": 1e3 * seconds / steps for part, seconds in own.items()}
+    return {"obs": obs, "block": block_frames, "steps/s": steps / total, **parts}
 
 
 def main() -> None:
     """Print the table."""
     print(machine())
-    print(table([measured(obs, shape) for shape in SHAPES for obs in LAWS]))
+    print(table([measured(*case) for case in CASES]))
 
 
 if __name__ == "__main__":

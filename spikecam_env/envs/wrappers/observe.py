@@ -28,7 +28,7 @@ from spikecam_env.envs.observations import (
     observation,
     restarted,
 )
-from spikecam_env.envs.wrappers.any_env import spike_camera_of
+from spikecam_env.envs.wrappers.any_env import SpikeCamera, spike_camera_of
 from spikecam_env.errors import InputError, NotReadyError
 from spikecam_env.sensor import Keyframes
 
@@ -120,7 +120,7 @@ def viewed(space: spaces.Space[Any], env: Any) -> CameraView:
     """
     frames, rows, columns = block_shape(space)
     camera = spike_camera_of(getattr(env.unwrapped, "envs", [env])[0])
-    if camera is not None and camera.frames_per_step != frames:
+    if isinstance(camera, SpikeCamera) and camera.frames_per_step != frames:
         raise InputError(
             f"the camera shows {frames} of the {camera.frames_per_step:g} frames of a step, and a law of spikes needs "
             "all; give obs= to SpikeCamera itself, or block_frames= of the whole step"
