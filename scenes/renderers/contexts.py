@@ -144,7 +144,8 @@ def _load(*names: str) -> ctypes.CDLL:
     global _started_in, _started
     if _started not in (None, names):
         raise NotReadyError(
-            f"OpenGL is loaded from {(_started or names)[0]} and cannot change to {names[0]}; start a new process for it"
+            f"OpenGL is loaded from {(_started or names)[0]} and cannot change to {names[0]}; "
+            f"start a new process for {names[0]}"
         )
     _started_in, _started = os.getpid(), names
     for name in names:
