@@ -29,6 +29,9 @@ from spikecam_env.checked import checked_count, checked_shape
 from spikecam_env.errors import InputError, NotReadyError, shown, unknown_name
 from spikecam_env.types import Pictures
 
+SUPERSAMPLE = 3
+"""Samples a pixel and axis: keyed light of a fast ball is then 0.7 % from 8 times as many keys, with 2 it is 1.4 %
+(`python -m benchmarks.mujoco_light`)."""
 MOST_SAMPLES = 8
 """Samples a pixel and axis at most: 64 a pixel."""
 MOST_GEOMS = 10_000
@@ -47,7 +50,7 @@ class MujocoPictures:
         model: mujoco.MjModel.
         shape: (rows, columns).
         camera: name or number of one of the model's, -1 for the free camera, or an MjvCamera; default: the first.
-        supersample: samples a pixel and axis, of which light and colour are the mean.
+        supersample: samples a pixel and axis, of which light and colour are the mean; default 3, to 8.
         transfer: from MuJoCo's numbers to linear light: "linear" [default], as its lamps add up, or one of
             `scenes.film.transfer`, such as "srgb", for scenes whose colours were chosen by their look on a screen.
         renderer: "egl-hardware", "egl-software" or "osmesa"; default: SPIKECAM_RENDERER, else the first that works.
@@ -72,7 +75,7 @@ class MujocoPictures:
         shape: tuple[int, int],
         camera: Any = None,
         *,
-        supersample: int = 2,
+        supersample: int = SUPERSAMPLE,
         transfer: str = "linear",
         renderer: str | None = None,
     ) -> None:
@@ -158,10 +161,7 @@ class MujocoPictures:
     def _drawn(self, data: Any, shape: tuple[int, int], by_number: bool = False) -> Iterator[_Drawing]:
         """The picture in the context's buffer, which is current inside."""
         mujoco = import_mujoco()
-        if not isinstance(data, mujoco.MjData):
-            raise InputError(f"data is a {type(data).__name__}; give the mujoco.MjData, e.g. env.unwrapped.data")
-        if data.qpos.shape[0] != self.model.nq or data.xpos.shape[0] != self.model.nbody:
-            raise InputError("data belongs to another model; give mujoco.MjData(model) of the model of these pictures")
+        checked_data(self.model, data)
         with self._one_draws:
             drawing = self._started()
             drawing.opengl.make_current()
@@ -244,6 +244,19 @@ class _Ending:
         self.context.free()
         self.opengl.release()
         self.opengl.end()
+
+
+def checked_data(model: Any, data: Any) -> Any:
+    """The data of this model as it is.
+
+    Raises:
+        InputError: it is no mujoco.MjData, or that of a model of another size.
+    """
+    if not isinstance(data, import_mujoco().MjData):
+        raise InputError(f"data is a {type(data).__name__}; give the mujoco.MjData, e.g. env.unwrapped.data")
+    if (len(data.qpos), len(data.xpos), len(data.geom_xpos)) != (model.nq, model.nbody, model.ngeom):
+        raise InputError("data belongs to another model; give mujoco.MjData(model) of the same model")
+    return data
 
 
 def averaged(values: Pictures, supersample: int) -> Pictures:

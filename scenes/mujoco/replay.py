@@ -77,7 +77,7 @@ def replay(model: Any, scratch: Any, before: State, after: Any) -> Course:
     if steps < 1:
         raise NotReadyError(
             f"the simulation's time went from {before.time_s:g} to {after.time:g} s: no step of physics lies between; "
-            "call begin(data) after every reset"
+            "call begin() after every reset"
         )
     if steps > MOST_STEPS:
         raise InputError(f"{steps} steps of physics lie between two calls; at most {MOST_STEPS} can be replayed")
