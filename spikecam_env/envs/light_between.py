@@ -5,11 +5,12 @@
 
 A simulator shows itself at the ends of its steps; a spike camera sees the time between.  `RenderedLight` blends the two
 pictures, so that things fade from place to place and do not move.  A simulator whose state can be had between two steps
-gives exact light by another class with the same two methods (`SpikeCamera(env, make_light=...)`).
+gives exact light by another class with the same methods (`SpikeCamera(env, make_light=...)`); MuJoCo has one.
 """
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Callable
 from math import floor
 from typing import Any, Protocol
@@ -46,6 +47,24 @@ class LightBetween(Protocol):
 
 MakeLight = Callable[[gymnasium.Env[Any, Any], CameraView], LightBetween]
 """(environment, camera) -> its light; called once, when the camera is put before the environment."""
+
+
+def usual_light(env: gymnasium.Env[Any, Any], view: CameraView) -> LightBetween:
+    """Exact light where MuJoCo is inside an environment, of its poses between two steps; else the rendered pictures'.
+
+    Args:
+        env: any.
+        view: the camera.
+
+    Raises:
+        InputError: as of `MujocoLight` and `RenderedLight`.
+    """
+    mujoco = sys.modules.get("mujoco")  # imported where it is inside
+    if mujoco is not None and isinstance(getattr(env.unwrapped, "model", None), mujoco.MjModel):
+        from scenes.mujoco import MujocoLight  # an optional package
+
+        return MujocoLight.of_env(env, view)
+    return RenderedLight(env, view)
 
 
 class RenderedLight:

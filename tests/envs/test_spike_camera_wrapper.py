@@ -237,6 +237,27 @@ def test_a_light_of_one_s_own_needs_no_pictures() -> None:
     assert env.light.at(150.0)[0, 0] == pytest.approx(0.15)
 
 
+def test_mujoco_inside_is_seen_between_its_steps_without_rendering() -> None:
+    pytest.importorskip("mujoco", reason="needs mujoco")
+    env = SpikeCamera(gymnasium.make("InvertedPendulum-v5", reset_noise_scale=0.1), "tfp", shape=(64, 64))
+    bare = gymnasium.make("InvertedPendulum-v5", reset_noise_scale=0.1)
+    bare.reset(seed=0)
+    env.reset(seed=0)
+    force = np.full(1, 3.0, np.float32)
+    for _ in range(2):
+        env.step(force)
+        bare.step(force)
+    np.testing.assert_array_equal(env.unwrapped.data.qpos, bare.unwrapped.data.qpos)  # type: ignore[attr-defined]
+    assert env.step_s == 0.04 and env.light.frame[[0, -1]].tolist() == [3200.0, 4800.0]
+    print(f"{len(env.light.frame)} keys a step")
+    assert len(env.light.frame) > 2 and env.render_mode is None
+    assert float(np.ptp(env.light.radiance)) > 0.1
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", UserWarning)
+        check_env(env, skip_render_check=True)
+    env.close()
+
+
 @pytest.mark.parametrize("mode", ["sync", "async"])
 def test_a_vector_is_a_vector_of_single_environments(mode: str) -> None:
     gymnasium.register("tests/Bar-v0", entry_point=lambda **given: Bar(**given), max_episode_steps=8)

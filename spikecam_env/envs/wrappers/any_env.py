@@ -29,7 +29,7 @@ from spikecam_env.checked import (
     checked_shape,
     checked_switch,
 )
-from spikecam_env.envs.light_between import MakeLight, RenderedLight
+from spikecam_env.envs.light_between import MakeLight, RenderedLight, usual_light
 from spikecam_env.envs.observations import Blocks, CameraView, Observation, ObservedStream, observation
 from spikecam_env.envs.reset_options import camera_options, loaded_model
 from spikecam_env.envs.spike_camera import SpikeCameraEnv
@@ -69,7 +69,7 @@ class SpikeCamera(gymnasium.Wrapper[Any, Any, Any, Any], gymnasium.utils.RecordC
         these names.
 
     Args:
-        env: with render mode "rgb_array", unless `make_light` needs no pictures.
+        env: with render mode "rgb_array", unless MuJoCo is inside or `make_light` needs no pictures.
         obs: a name of `observations.OBSERVATIONS`, or an `Observation`.
         obs_state: whether the age of the picture is observed too.
         obs_inner: whether the environment's own observation is observed too.
@@ -80,9 +80,10 @@ class SpikeCamera(gymnasium.Wrapper[Any, Any, Any, Any], gymnasium.utils.RecordC
         scale: spikes a frame of white; default 0.6.
         mean_interval: expose in every episode so that pixels fire every so many frames on average over the first
             picture, in place of `scale`.
-        transfer: from values of the pictures to linear light: "srgb" (default), "bt709", "linear", or a power, 2.2.
-        make_light: makes the light between two steps in another way than by pictures at their ends, see
-            `light_between.MakeLight`.
+        transfer: from values of rendered pictures to linear light: "srgb" (default), "bt709", "linear", or a power,
+            e.g. 2.2; whoever gives it has these pictures, of MuJoCo too.
+        make_light: makes the light between two steps, see `light_between.MakeLight`; default: that of MuJoCo's poses
+            where it is inside the environment, else pictures at their ends, blended.
         engine: of the sensor, "auto", "fast" or "reference".
         threads: of the sensor.
 
@@ -145,7 +146,7 @@ class SpikeCamera(gymnasium.Wrapper[Any, Any, Any, Any], gymnasium.utils.RecordC
         self.view = CameraView(self.shape, frames, self.model.frame_rate_hz)
         self._scale, self._mean_interval = _checked_exposure(scale, mean_interval)
         self._light_between = _light_maker(transfer, make_light)(env, self.view)
-        if make_light is None:
+        if isinstance(self._light_between, RenderedLight):
             self.metadata = {**env.metadata, "render_modes": ["rgb_array"]}
         self._engine, self._threads = engine, threads
         self._sensor: SpikeSensor | None = self._unit_of(self.model, 0)
@@ -319,7 +320,7 @@ def _checked_exposure(scale: float | None, mean_interval: float | None) -> tuple
 
 def _light_maker(transfer: str | float | None, make_light: MakeLight | None) -> MakeLight:
     if make_light is None:
-        return partial(RenderedLight, transfer="srgb" if transfer is None else transfer)
+        return usual_light if transfer is None else partial(RenderedLight, transfer=transfer)
     if transfer is not None:
         raise InputError(
             f"transfer is {shown(transfer)} and make_light is given, which has its own; give one of the two"
