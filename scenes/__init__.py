@@ -1,5 +1,6 @@
 """Scenes before the camera: light over time, and the truth about it."""
 
+from scenes.film.frame_light import FrameLight
 from scenes.film.video import VideoScene
 from scenes.flat.collage import Collage
 from scenes.flat.disk import RotatingDisk
@@ -26,6 +27,7 @@ DISTRIBUTION = "spikecam-env"
 __all__ = [
     "TEXTURES",
     "Collage",
+    "FrameLight",
     "Gaze",
     "RotatingDisk",
     "Scene",

@@ -14,7 +14,7 @@ import numpy as np
 from scenes.film.along_motion import MovingPicture, lay_between
 from scenes.film.given_picture import GivenPicture
 from scenes.film.point_paths import fastest, moving_pictures, with_outlines
-from scenes.keys import interval_for
+from scenes.keys import AT_REST, interval_for, key_frames
 from spikecam_env.types import Floats, Pictures
 
 Motions = tuple[Pictures | None, Pictures | None]
@@ -57,15 +57,17 @@ class Interval:
 
         Args:
             motion_per_key: largest motion from one to the next [pixels of the pictures], as far as whole frames allow.
+
+        Raises:
+            InputError: the light at so many keys does not fit in memory.
         """
         first, last = int(np.ceil(self.before.at)), int(np.floor(self.after.at))
         if first > last:
             return np.empty(0)
-        inner = range(0)
-        if self.moving is not None:
-            step = interval_for(fastest(self.moving) / (self.after.at - self.before.at), motion_per_key)
-            inner = range((first // step + 1) * step, last, step)
-        return np.unique([first, *inner, last]).astype(np.float64)
+        if self.moving is None or first == last:
+            return np.unique([first, last]).astype(np.float64)
+        step = interval_for(fastest(self.moving) / (self.after.at - self.before.at), motion_per_key)
+        return key_frames(self.after.light.shape, first, last, step, AT_REST)
 
     def at(self, frame: float) -> Pictures:
         """Light (h, w) at a frame; the pictures themselves at their own times."""

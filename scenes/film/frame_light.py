@@ -24,7 +24,7 @@ from scenes.film.point_paths import SHARE_OF_EARLIER
 from scenes.film.transfer import CHANNELS, curve
 from scenes.keys import paint_keys
 from scenes.protocol import FRAME_RATES_HZ, MOST_LIGHT
-from spikecam_env.checked import checked_memory, checked_number, checked_shape, checked_whole
+from spikecam_env.checked import checked_number, checked_shape, checked_whole
 from spikecam_env.errors import InputError, NotReadyError, shown, unknown_name
 from spikecam_env.numbers import LARGEST_COUNT, as_number
 from spikecam_env.sensor import Keyframes
@@ -133,7 +133,8 @@ class FrameLight:
             InputError: a shape, type or value is not as above, or the keys do not fit in memory.
         """
         origin = self._origin(time_s)
-        at = round(origin[1] + (time_s - origin[0]) * self.frame_rate_hz, CLOSE)
+        since = (time_s - origin[0]) * self.frame_rate_hz
+        at = round(origin[1] + checked_number(since, "time_s [frames]", most=LARGEST_COUNT), CLOSE)
         before = self._state
         if before is not None and at <= before.last.at:
             raise InputError(
@@ -198,7 +199,6 @@ class FrameLight:
         finer = interval.after.light.shape[0] // self.shape[0]
         frames = interval.key_frames(self.motion_per_key * finer)
         frames = frames[frames > self.frame]
-        checked_memory(4 * len(frames) * self.shape[0] * self.shape[1], f"light at {len(frames)} keys")
 
         def paint(frame: float, picture: Pictures) -> None:
             picture[:] = fitted(interval.at(frame), self.shape)

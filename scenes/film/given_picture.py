@@ -49,7 +49,7 @@ def linear_light(frame: ArrayLike, shape: tuple[int, int], transfer: str, channe
     Raises:
         InputError: another shape or type; a value that is negative, not finite or above white where that has no light.
     """
-    values = real_numbers(frame, "frame", "uf")
+    values = real_numbers(frame, "frame", "iuf")
     full = 1 if values.dtype.kind == "f" else FULL_SCALE.get(values.dtype.name)
     if full is None:
         raise InputError(f"frame is {values.dtype}; it must be uint8, uint16, or floats with white at 1")
@@ -71,7 +71,7 @@ def linear_light(frame: ArrayLike, shape: tuple[int, int], transfer: str, channe
 
 def checked_motion(motion: ArrayLike, shape: tuple[int, ...]) -> Pictures:
     """Motion (h, w, 2) as float32; InputError for another shape or type, NaN, and more than MOST_MOTION."""
-    values = real_numbers(motion, "motion", "f")
+    values = real_numbers(motion, "motion", "iuf")
     if values.shape != (*shape, 2):
         raise InputError(f"motion has shape {values.shape}; it must be {(*shape, 2)}, x then y [pixels] of every pixel")
     if not np.abs(values).max() <= MOST_MOTION:
@@ -81,7 +81,7 @@ def checked_motion(motion: ArrayLike, shape: tuple[int, ...]) -> Pictures:
 
 def checked_nearness(depth: ArrayLike, shape: tuple[int, ...]) -> Pictures:
     """Nearness (h, w) float32, 1 / depth; InputError for another shape or type, NaN, and depth of 0 or less."""
-    values = real_numbers(depth, "depth", "f")
+    values = real_numbers(depth, "depth", "iuf")
     if values.shape != tuple(shape):
         raise InputError(
             f"depth has shape {values.shape}; it must be {tuple(shape)}, the rows and columns of the frame"
