@@ -21,7 +21,6 @@ import numpy as np
 
 from scenes.film.frame_light import FrameLight
 from scenes.film.given_picture import linear_light
-from scenes.film.transfer import curve
 from spikecam_env.envs.observations import CameraView
 from spikecam_env.errors import InputError, shown
 from spikecam_env.sensor import Keyframes
@@ -87,8 +86,7 @@ class RenderedLight:
                 'render_mode="rgb_array"'
             )
         self._env, self._view = env, view
-        self._transfer = transfer if isinstance(transfer, str) else f"gamma{transfer:g}"
-        curve(self._transfer)
+        self._transfer = FrameLight(view.shape, view.frame_rate_hz, transfer).transfer  # its name, checked
         self._film = FrameLight(view.shape, view.frame_rate_hz, transfer="linear", scale=1.0)
         self._size: tuple[int, ...] | None = None
 
@@ -100,13 +98,13 @@ class RenderedLight:
 
     def step(self, frame: float) -> Keyframes:
         """See `LightBetween.step`."""
-        picture = self._env.render()
+        picture: Any = self._env.render()
         light = light_on(picture, self._view.shape, self._transfer)
-        if np.shape(picture) != (self._size or np.shape(picture)):
+        if picture.shape != (self._size or picture.shape):
             raise InputError(
-                f"render() returned a picture {np.shape(picture)}, the one before is {self._size}; render one size"
+                f"render() returned a picture {picture.shape}, the one before is {self._size}; render one size"
             )
-        self._size = np.shape(picture)
+        self._size = picture.shape
         return self._film.add(frame / self._view.frame_rate_hz, light)
 
     def close(self) -> None:

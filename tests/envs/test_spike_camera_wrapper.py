@@ -303,6 +303,7 @@ def test_specs_of_torchrl_are_those_of_what_is_returned() -> None:
         ({}, {"mean_interval": 0.5}, "mean_interval = 0.5"),
         ({}, {"transfer": "rgb"}, r"unknown transfer 'rgb'"),
         ({}, {"transfer": -1}, r"unknown transfer"),
+        ({}, {"transfer": ["srgb"]}, r"unknown transfer"),
         ({}, {"transfer": "srgb", "make_light": Lamp}, "give one of the two"),
         ({}, {"make_light": "mujoco"}, "make_light = 'mujoco'; give a function"),
         ({}, {"obs_inner": "yes"}, "obs_inner = 'yes'; it must be True or False"),

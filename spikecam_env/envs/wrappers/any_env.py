@@ -46,8 +46,8 @@ LONGEST_STEP_S = 10.0
 """[s] Longest step: 400 000 frames at 40 kHz, which take a second of a core at 64 x 64."""
 PIECE_FRAMES = 1024
 """[frames] Exposed at a time at most, so that a long step takes no more memory than a short one."""
-ROUNDING = 1e-6
-"""[frames] A step that ends so little before a whole frame ends with it: products of floats are off by less."""
+CLOSE = 6
+"""Decimals of a frame to which ends of steps are rounded: whole frames but for how they were computed."""
 
 
 class SpikeCamera(gymnasium.Wrapper[Any, Any, Any, Any], gymnasium.utils.RecordConstructorArgs):
@@ -142,7 +142,7 @@ class SpikeCamera(gymnasium.Wrapper[Any, Any, Any, Any], gymnasium.utils.RecordC
             step_time_s(env) if step_s is None else checked_number(step_s, "step_s", 0.0, above=True, unit="s")
         )
         self.frames_per_step = _checked_frames(self.step_s, self.model.frame_rate_hz)
-        frames = _checked_block(block_frames, floor(self.frames_per_step + ROUNDING), self.shape)
+        frames = _checked_block(block_frames, floor(round(self.frames_per_step, CLOSE)), self.shape)
         self.view = CameraView(self.shape, frames, self.model.frame_rate_hz)
         self._scale, self._mean_interval = _checked_exposure(scale, mean_interval)
         self._light_between = _light_maker(transfer, make_light)(env, self.view)
@@ -213,12 +213,12 @@ class SpikeCamera(gymnasium.Wrapper[Any, Any, Any, Any], gymnasium.utils.RecordC
     @property
     def _end(self) -> float:
         """Of this step [frames]; the camera exposes the whole frames until then."""
-        return self._steps * self.frames_per_step
+        return round(self._steps * self.frames_per_step, CLOSE)
 
     def _seen(self, light: Keyframes, inner: Any, info: dict[str, Any]) -> tuple[Any, dict[str, Any]]:
         """The observation and info after the exposure of all frames of a step."""
         sensor, scaled = self._open(), Keyframes.known(light.frame, light.radiance * np.float32(self._gain))
-        for frames in _pieces(floor(self._end + ROUNDING) - sensor.frame - self.view.frames_per_step):
+        for frames in _pieces(floor(self._end) - sensor.frame - self.view.frames_per_step):
             self._observed.skip(self._exposed(scaled, frames))
         self._blocks = self._exposed(scaled, self.view.frames_per_step)
         seen, age = self._observed.step(self._blocks)
@@ -296,7 +296,7 @@ def step_time_s(env: gymnasium.Env[Any, Any]) -> float:
 def _checked_frames(step_s: float, frame_rate_hz: float) -> float:
     """Frames of a step; InputError for less than one, and for more than those of LONGEST_STEP_S."""
     frames = step_s * frame_rate_hz
-    if frames + ROUNDING < 1 or step_s > LONGEST_STEP_S:
+    if round(frames, CLOSE) < 1 or step_s > LONGEST_STEP_S:
         raise InputError(
             f"a step takes {step_s:g} s, {frames:g} frames of the camera; give step_s from {1 / frame_rate_hz:g} to "
             f"{LONGEST_STEP_S:g} s"
