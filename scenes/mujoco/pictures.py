@@ -38,7 +38,7 @@ MOST_GEOMS = 10_000
 """Things of a picture at most, as MuJoCo's own `Renderer` has it."""
 KINDS = ("egl-hardware", "egl-software", "osmesa")
 
-_SPAWN = "start processes with multiprocessing.get_context('spawn')"
+_SPAWN = "start processes with multiprocessing.get_context('spawn'), or draw in the children alone"
 
 
 class MujocoPictures:
@@ -59,7 +59,7 @@ class MujocoPictures:
         InputError: MuJoCo or OpenGL is missing, or an argument is out of range.
 
     Example:
-        >>> import mujoco
+        >>> mujoco = import_mujoco()
         >>> sphere = "<geom type='sphere' size='.2' rgba='1 0 0 1'/>"
         >>> model = mujoco.MjModel.from_xml_string(f"<mujoco><worldbody>{sphere}</worldbody></mujoco>")
         >>> data = mujoco.MjData(model)
@@ -185,9 +185,7 @@ class MujocoPictures:
             self._drawing = _start(self.model, fine, chosen(self._wanted))
             self._drawing.end = finalize(self, self._drawing.end)
         if self._drawing.process != os.getpid():
-            raise NotReadyError(
-                f"MuJoCo drew before this process was forked, and OpenGL does not follow; {_SPAWN}, or draw first there"
-            )
+            raise NotReadyError(f"MuJoCo drew before this process was forked, and OpenGL does not follow; {_SPAWN}")
         return self._drawing
 
 
@@ -210,11 +208,11 @@ def _start(model: Any, shape: tuple[int, int], kind: str) -> _Drawing:
             f"MuJoCo draws with OpenGL alone, not with {shown(kind)}; {FIX['egl-software']}, or unset SPIKECAM_RENDERER"
         )
     if not contexts.can_start():
-        raise NotReadyError(
-            f"MuJoCo cannot draw in a fork of a process that has used OpenGL; {_SPAWN}, or draw there alone"
-        )
+        raise NotReadyError(f"MuJoCo cannot draw in a fork of a process that has used OpenGL; {_SPAWN}")
     try:
         opengl = contexts.start(kind, "compatible")
+    except NotReadyError:
+        raise
     except RuntimeError as failure:
         raise InputError(f"renderer {kind!r} does not work here: {failure}; {FIX[kind]}") from failure
     try:
