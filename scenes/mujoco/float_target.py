@@ -38,7 +38,8 @@ class FloatTarget:
         mujoco = import_mujoco()
         self._context, self._shape = context, (rows, columns)
         context.offSamples = 0  # every sample is a pixel of its own, so that textures and edges are averaged alike
-        mujoco.mjr_resizeOffscreen(columns, rows, context)
+        for width in (columns + 1, columns):  # the size that it has already would be left as it is, with its samples
+            mujoco.mjr_resizeOffscreen(width, rows, context)
         mujoco.mjr_setBuffer(mujoco.mjtFramebuffer.mjFB_OFFSCREEN, context)
         self._read = ctypes.CFUNCTYPE(None, *(ctypes.c_int,) * 6, ctypes.c_void_p)(_address(function, "glReadPixels"))
         _function(function, "glBindRenderbuffer", 2)(_RENDERBUFFER, context.offColor)

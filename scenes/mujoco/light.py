@@ -59,7 +59,7 @@ class MujocoLight:
         InputError: MuJoCo or OpenGL is missing, or an argument is out of range.
 
     Example:
-        >>> import mujoco
+        >>> mujoco = import_mujoco()
         >>> ball = "<body><freejoint/><geom type='sphere' size='.2'/></body>"
         >>> model = mujoco.MjModel.from_xml_string(f"<mujoco><worldbody>{ball}</worldbody></mujoco>")
         >>> data = mujoco.MjData(model)

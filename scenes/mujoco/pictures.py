@@ -29,16 +29,16 @@ from spikecam_env.checked import checked_count, checked_shape
 from spikecam_env.errors import InputError, NotReadyError, shown, unknown_name
 from spikecam_env.types import Pictures
 
-SUPERSAMPLE = 3
-"""Samples a pixel and axis: keyed light of a fast ball is then 0.7 % from 8 times as many keys, with 2 it is 1.4 %
-(`python -m benchmarks.mujoco_light`)."""
+SUPERSAMPLE = 4
+"""Samples a pixel and axis: fewer leave edges that jump as things move; keys of a white ball on grey are then 0.9 %
+from eight times as many, with 3 it is 1.3 %, with 2 it is 1.9 % (`python -m benchmarks.mujoco_light`)."""
 MOST_SAMPLES = 8
 """Samples a pixel and axis at most: 64 a pixel."""
 MOST_GEOMS = 10_000
 """Things of a picture at most, as MuJoCo's own `Renderer` has it."""
 KINDS = ("egl-hardware", "egl-software", "osmesa")
 
-_SPAWN = "start processes with multiprocessing.get_context('spawn')"
+_SPAWN = "start processes with multiprocessing.get_context('spawn'), or draw in the children alone"
 
 
 class MujocoPictures:
@@ -50,7 +50,7 @@ class MujocoPictures:
         model: mujoco.MjModel.
         shape: (rows, columns).
         camera: name or number of one of the model's, -1 for the free camera, or an MjvCamera; default: the first.
-        supersample: samples a pixel and axis, of which light and colour are the mean; default 3, to 8.
+        supersample: samples a pixel and axis, of which light and colour are the mean; default 4, to 8.
         transfer: from MuJoCo's numbers to linear light: "linear" [default], as its lamps add up, or one of
             `scenes.film.transfer`, such as "srgb", for scenes whose colours were chosen by their look on a screen.
         renderer: "egl-hardware", "egl-software" or "osmesa"; default: SPIKECAM_RENDERER, else the first that works.
@@ -59,7 +59,7 @@ class MujocoPictures:
         InputError: MuJoCo or OpenGL is missing, or an argument is out of range.
 
     Example:
-        >>> import mujoco
+        >>> mujoco = import_mujoco()
         >>> sphere = "<geom type='sphere' size='.2' rgba='1 0 0 1'/>"
         >>> model = mujoco.MjModel.from_xml_string(f"<mujoco><worldbody>{sphere}</worldbody></mujoco>")
         >>> data = mujoco.MjData(model)
@@ -185,9 +185,7 @@ class MujocoPictures:
             self._drawing = _start(self.model, fine, chosen(self._wanted))
             self._drawing.end = finalize(self, self._drawing.end)
         if self._drawing.process != os.getpid():
-            raise NotReadyError(
-                f"MuJoCo drew before this process was forked, and OpenGL does not follow; {_SPAWN}, or draw first there"
-            )
+            raise NotReadyError(f"MuJoCo drew before this process was forked, and OpenGL does not follow; {_SPAWN}")
         return self._drawing
 
 
@@ -210,11 +208,11 @@ def _start(model: Any, shape: tuple[int, int], kind: str) -> _Drawing:
             f"MuJoCo draws with OpenGL alone, not with {shown(kind)}; {FIX['egl-software']}, or unset SPIKECAM_RENDERER"
         )
     if not contexts.can_start():
-        raise NotReadyError(
-            f"MuJoCo cannot draw in a fork of a process that has used OpenGL; {_SPAWN}, or draw there alone"
-        )
+        raise NotReadyError(f"MuJoCo cannot draw in a fork of a process that has used OpenGL; {_SPAWN}")
     try:
         opengl = contexts.start(kind, "compatible")
+    except NotReadyError:
+        raise
     except RuntimeError as failure:
         raise InputError(f"renderer {kind!r} does not work here: {failure}; {FIX[kind]}") from failure
     try:

@@ -27,7 +27,8 @@ mujoco = import_mujoco()
 
 FLAT = 'orthographic="true"' if hasattr(mujoco.MjModel, "cam_orthographic") else 'projection="orthographic"'
 ROOM = f"""<mujoco><option timestep="0.001"/>
-<visual><headlight ambient="1 1 1" diffuse="0 0 0" specular="0 0 0"/></visual>
+<visual><headlight ambient="1 1 1" diffuse="0 0 0" specular="0 0 0"/>
+<quality shadowsize="0"/></visual>
 <worldbody><geom type="plane" size="9 9 .1" pos="0 0 -2" rgba=".25 .25 .25 1"/>
 <camera name="above" pos="0 0 3" fovy="45"/><camera name="flat" pos="0 0 3" fovy="5" {FLAT}/>
 <body name="box" pos=".5 .25 0"><geom name="box" type="box" size=".25 .25 .25" rgba="1 0 0 1"/></body>
@@ -54,7 +55,8 @@ def of_frames(keys: Keyframes, frames: int, parts: int = 64) -> np.ndarray:
 
 
 def test_a_red_box_is_where_the_camera_sees_it_and_nowhere_else() -> None:
-    """Its top is 2.75 m below; of a picture 2 * 2.75 tan(22.5 deg) = 2.278 m high it covers 0.5 m a side."""
+    """Its top is 2.75 m below; of a picture 2 * 2.75 tan(22.5 deg) = 2.278 m high it covers 0.5 m a side.  Four
+    samples a pixel and axis make it 480 x 640, as large as MuJoCo's own buffer, whose samples must not stay."""
     model, data = room()
     with MujocoPictures(model, (120, 160), "above") as pictures:
         colour, seen = pictures.colour(data), pictures.segmentation(data)
@@ -64,9 +66,9 @@ def test_a_red_box_is_where_the_camera_sees_it_and_nowhere_else() -> None:
     print(rows.min(), rows.max(), columns.min(), columns.max())
     assert abs(rows.min() - (59.5 - 0.5 / pixel)) <= 1 and abs(columns.max() - (79.5 + 0.75 / pixel)) <= 1
     assert abs(rows.max() + 1 - (59.5 + 0.5)) <= 1
-    identity = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_GEOM, "box")
-    assert (seen[30:50, 105:110] == (identity, mujoco.mjtObj.mjOBJ_GEOM)).all()
-    assert (seen[100, 150] == (0, mujoco.mjtObj.mjOBJ_GEOM)).all()
+    identity, geom = model.geom("box").id, int(mujoco.mjtObj.mjOBJ_GEOM)
+    assert (seen[38:55, 100:110] == (identity, geom)).all()
+    assert (seen[100, 150] == (0, geom)).all()
 
 
 @pytest.mark.parametrize("camera", ["above", "flat"])
@@ -74,10 +76,10 @@ def test_depth_is_metres_along_the_axis(camera: str) -> None:
     model, data = room()
     with MujocoPictures(model, (120, 160), camera) as pictures:
         depth, seen = pictures.depth(data), pictures.segmentation(data)[..., 0]
-    boxes = {0: 5.0, 1: 2.75}
-    for geom, metres in boxes.items():
-        np.testing.assert_allclose(depth[seen == geom], metres, rtol=2e-3 if geom else 3e-3, atol=0.3 * (geom == 1))
-        assert abs(np.median(depth[seen == geom]) - metres) < 0.01
+    np.testing.assert_allclose(depth[seen == 0], 5.0, rtol=1e-4)
+    box = depth[seen == 1]  # the camera sees its top, and a side
+    print(box.min(), np.median(box), box.max())
+    assert np.median(box) == pytest.approx(2.75, rel=1e-4) and box.min() > 2.749 and box.max() < 3.251
 
 
 def test_light_is_what_the_lamp_states_without_a_curve_and_finer_than_bytes() -> None:
@@ -132,39 +134,43 @@ def test_keys_of_a_fast_ball_are_within_one_percent_of_eight_times_as_many(speed
     made = {}
     for motion in (0.5, 0.5 / 8):
         model, data = room(**speed)
+        model.opt.timestep = 0.004
         light = MujocoLight(model, data, (64, 64), camera="above", motion_per_key=motion)
         light.begin()
         mujoco.mj_step(model, data)
         keys = light.step()
-        made[motion] = len(keys.frame), of_frames(keys, 40)
+        made[motion] = len(keys.frame), of_frames(keys, 160, 16)
         light.close()
     (few, coarse), (many, fine) = made[0.5], made[0.5 / 8]
     error = np.sqrt(np.mean((coarse - fine) ** 2)) / fine.mean()
     print(f"{few} keys against {many}: {100 * error:.2f} % rms")
-    assert many > 6 * few > 6
+    assert many > 5 * few > 15
     assert error < 0.01
 
 
 def test_nothing_moves_more_than_half_a_pixel_from_key_to_key() -> None:
     """The middle of the ball in the pictures themselves: it moves evenly, and by no more than the bound."""
     model, data = room(x=25.0, spin=300.0)
+    model.opt.timestep = 0.004
     light = MujocoLight(model, data, (64, 64), camera="above")
     light.begin()
     mujoco.mj_step(model, data)
     keys = light.step()
     light.close()
-    white = np.where(keys.radiance > 0.5, keys.radiance, 0)[:, 34:]  # below the box
+    white = keys.radiance[:, 34:] - np.float32(0.25)  # less the floor's, below the box
     middle = (white * np.arange(64)).sum(axis=(1, 2)) / white.sum(axis=(1, 2))
-    print(np.diff(middle), np.diff(keys.frame))
-    assert np.diff(middle).max() < 0.55 and np.diff(middle).min() > 0.2
+    rate = np.diff(middle) / np.diff(keys.frame)
+    print(np.diff(middle), rate)
+    assert np.diff(middle).max() < 0.55
+    assert rate == pytest.approx(rate.mean(), rel=0.2)
 
 
 def test_a_camera_that_moves_moves_the_floor() -> None:
     """A camera that turns by w dt moves all that is seen at its axis by focal w dt pixels."""
     text = ROOM.replace(
         '<body name="box"',
-        '<body><joint name="pan" axis="0 1 0"/><geom size=".01" pos="0 0 9"/>'
-        '<camera name="pan" pos="0 0 3" fovy="45"/></body><body name="box"',
+        '<body pos="0 0 3"><joint name="pan" axis="0 1 0"/><geom size=".01" pos="0 0 1"/>'
+        '<camera name="pan" fovy="45"/></body><body name="box"',
     )
     model = mujoco.MjModel.from_xml_string(text)
     model.opt.gravity[:] = 0
@@ -178,7 +184,7 @@ def test_a_camera_that_moves_moves_the_floor() -> None:
     _, length = path_lengths(model, scratch, course, Boxes(model), pictures.projection, (64, 64))
     at_axis = 32 / np.tan(np.pi / 8) * 0.01
     print(length[-1], at_axis)
-    assert at_axis < length[-1] < 3 * at_axis
+    assert at_axis <= length[-1] < 2 * at_axis
 
 
 def test_key_frames_are_whole_where_they_can_be() -> None:
@@ -242,7 +248,7 @@ def test_threads_share_a_context() -> None:
 
 
 def test_fifty_makes_leave_no_memory_behind() -> None:
-    """A context kept would hold its 0.9 MB of picture and depth, and its shadow map: 64 MB."""
+    """A context kept would hold its picture and depth, 2.9 MB."""
     model, data = room()
     used = []
     for make in range(60):

@@ -36,6 +36,7 @@ MODULES = (
     "scenes",
     "scenes.catalogue",
     "scenes.world",
+    "scenes.mujoco",
     "scenes.camera",
     "scenes.exposure",
     "scenes.meshes",
