@@ -17,7 +17,7 @@ from denoiser import DenoiseObservation
 from spikecam_env.envs.observations import TFP
 from spikecam_env.envs.registration import register
 from spikecam_env.envs.wrappers import ObserveSpikes, RandomizeLight, RandomizeSensor, SpikeCamera
-from spikecam_env.errors import InputError, NotReadyError
+from spikecam_env.errors import InputError, NotReadyError, OwnCodeError
 from spikecam_env.sensor import Keyframes
 
 register()
@@ -237,6 +237,15 @@ def test_a_light_of_one_s_own_needs_no_pictures() -> None:
     assert env.light.at(150.0)[0, 0] == pytest.approx(0.15)
 
 
+def test_a_light_that_is_none_is_named() -> None:
+    class Dark(Lamp):
+        def begin(self, frame: float) -> Any:
+            return None
+
+    with pytest.raises(OwnCodeError, match="the light between two steps is None; begin and step must return Keyframes"):
+        camera(make_light=Dark).reset()
+
+
 def test_mujoco_inside_is_seen_between_its_steps_without_rendering() -> None:
     pytest.importorskip("mujoco", reason="needs mujoco")
     env = SpikeCamera(gymnasium.make("InvertedPendulum-v5", reset_noise_scale=0.1), "tfp", shape=(64, 64))
@@ -299,6 +308,7 @@ def test_specs_of_torchrl_are_those_of_what_is_returned() -> None:
         ({}, {"obs": 3}, "obs = 3; give a name"),
         ({}, {"block_frames": 101}, "block_frames = 101; it must be a whole number, 1 to 100"),
         ({}, {"scale": 0.0}, "scale = 0.0"),
+        ({}, {"scale": 1e300}, r"scale = 1e\+300"),
         ({}, {"scale": 0.5, "mean_interval": 10.0}, "give one of the two"),
         ({}, {"mean_interval": 0.5}, "mean_interval = 0.5"),
         ({}, {"transfer": "rgb"}, r"unknown transfer 'rgb'"),

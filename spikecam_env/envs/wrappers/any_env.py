@@ -21,6 +21,7 @@ import numpy as np
 from gymnasium import spaces
 
 from scenes.exposure import checked_interval
+from scenes.protocol import MOST_LIGHT
 from spikecam_env.checked import (
     checked_count,
     checked_memory,
@@ -33,7 +34,7 @@ from spikecam_env.envs.light_between import MakeLight, RenderedLight, usual_ligh
 from spikecam_env.envs.observations import Blocks, CameraView, Observation, ObservedStream, observation
 from spikecam_env.envs.reset_options import camera_options, loaded_model
 from spikecam_env.envs.spike_camera import SpikeCameraEnv
-from spikecam_env.errors import InputError, NotReadyError, shown
+from spikecam_env.errors import InputError, NotReadyError, OwnCodeError, shown
 from spikecam_env.numbers import as_number
 from spikecam_env.sensor import Keyframes, SensorModel, SpikeSensor
 from spikecam_env.sensor.model import generator
@@ -172,7 +173,7 @@ class SpikeCamera(gymnasium.Wrapper[Any, Any, Any, Any], gymnasium.utils.RecordC
         self._sensor = self._unit_of(model, int(self._rng.integers(2**31)))
         self._observed.begin()
         self._steps = 1
-        light = self._light_between.begin(self._end)
+        light = _checked_light(self._light_between.begin(self._end))
         self._gain = self._light_factor * self._exposure(light)
         return self._seen(light, inner, info)
 
@@ -181,7 +182,7 @@ class SpikeCamera(gymnasium.Wrapper[Any, Any, Any, Any], gymnasium.utils.RecordC
         self._check_begun()
         inner, reward, terminated, truncated, info = self.env.step(action)
         self._steps += 1
-        observation, info = self._seen(self._light_between.step(self._end), inner, info)
+        observation, info = self._seen(_checked_light(self._light_between.step(self._end)), inner, info)
         return observation, reward, terminated, truncated, info
 
     def close(self) -> None:
@@ -315,7 +316,7 @@ def _checked_exposure(scale: float | None, mean_interval: float | None) -> tuple
     if scale is not None and mean_interval is not None:
         raise InputError(f"scale is {shown(scale)} and mean_interval {shown(mean_interval)}; give one of the two")
     interval = None if mean_interval is None else checked_interval(mean_interval)
-    return SCALE if scale is None else checked_number(scale, "scale", 0.0, above=True), interval
+    return SCALE if scale is None else checked_number(scale, "scale", 0.0, MOST_LIGHT, above=True), interval
 
 
 def _light_maker(transfer: str | float | None, make_light: MakeLight | None) -> MakeLight:
@@ -328,6 +329,12 @@ def _light_maker(transfer: str | float | None, make_light: MakeLight | None) -> 
     if not callable(make_light):
         raise InputError(f"make_light = {shown(make_light)}; give a function (env, view) -> LightBetween")
     return make_light
+
+
+def _checked_light(light: Any) -> Keyframes:
+    if not isinstance(light, Keyframes):
+        raise OwnCodeError(f"the light between two steps is {shown(light)}; begin and step must return Keyframes")
+    return light
 
 
 def _pieces(frames: int) -> Iterator[int]:
