@@ -32,6 +32,22 @@ class LightBetween(Protocol):
 
     Frames are those of the episode; the camera exposes whole ones, up to the last that is over.  A step's light begins
     with the key that the last one ended with.
+
+    Example:
+        >>> import gymnasium
+        >>> from spikecam_env.sensor import Keyframes
+        >>> class Lamp:  # as bright as a tenth of white, whatever the simulator does
+        ...     def begin(self, frame):
+        ...         return Keyframes([frame], np.full((1, 4, 6), 0.1))
+        ...
+        ...     step = begin
+        ...
+        ...     def close(self):
+        ...         pass
+        >>> from spikecam_env.envs.wrappers import SpikeCamera
+        >>> env = SpikeCamera(gymnasium.make("CartPole-v1"), shape=(4, 6), make_light=lambda env, view: Lamp())
+        >>> env.reset(seed=0)[0].shape
+        (1, 4, 6)
     """
 
     def begin(self, frame: float) -> Keyframes:
@@ -57,6 +73,13 @@ def usual_light(env: gymnasium.Env[Any, Any], view: CameraView) -> LightBetween:
 
     Raises:
         InputError: as of `MujocoLight` and `RenderedLight`.
+
+    Example:
+        >>> import gymnasium
+        >>> from spikecam_env.envs.observations import CameraView
+        >>> cart = gymnasium.make("CartPole-v1", render_mode="rgb_array")
+        >>> type(usual_light(cart, CameraView((4, 6), 40))).__name__
+        'RenderedLight'
     """
     mujoco = sys.modules.get("mujoco")  # imported where it is inside
     if mujoco is not None and isinstance(getattr(env.unwrapped, "model", None), mujoco.MjModel):
@@ -77,6 +100,14 @@ class RenderedLight:
     Raises:
         InputError: for another render mode and an unknown transfer; in `begin` and `step` for pictures that are none,
             change their size, or hold values that are no light.
+
+    Example:
+        >>> import gymnasium
+        >>> from spikecam_env.envs.observations import CameraView
+        >>> cart = gymnasium.make("CartPole-v1", render_mode="rgb_array")
+        >>> light, (state, info) = RenderedLight(cart, CameraView((4, 6), 40)), cart.reset(seed=0)
+        >>> light.begin(800).frame.tolist(), light.step(1600).frame.tolist()
+        ([800.0], [800.0, 1600.0])
     """
 
     def __init__(self, env: gymnasium.Env[Any, Any], view: CameraView, transfer: str | float = "srgb") -> None:

@@ -23,6 +23,7 @@ MODULES = (
     "spikecam_env.envs.tasks.env",
     "spikecam_env.envs.tasks.base",
     "spikecam_env.envs.vector",
+    "spikecam_env.envs.light_between",
     "spikecam_env.envs.wrappers",
     "spikecam_env.envs.wrappers.sb3",
     "spikecam_env.agents.agent",

@@ -94,6 +94,7 @@ class SpikeCamera(gymnasium.Wrapper[Any, Any, Any, Any], gymnasium.utils.RecordC
         NotReadyError: for a step before the first reset, and after `close`.
 
     Example:
+        >>> import gymnasium
         >>> env = SpikeCamera(gymnasium.make("CartPole-v1", render_mode="rgb_array"), "tfp", shape=(32, 48))
         >>> picture, info = env.reset(seed=0)
         >>> picture.shape, env.frames_per_step, info["frame"]
