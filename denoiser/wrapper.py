@@ -12,7 +12,6 @@ from numpy.typing import NDArray
 
 from denoiser.online import OnlineDnSS
 from denoiser.passes.recipe import RECIPES
-from spikecam_env.envs.wrappers.observe import viewed
 from spikecam_env.errors import InputError, NotReadyError, unknown_name
 
 OUTPUTS = ("spikes", "rate")
@@ -54,6 +53,8 @@ class DenoiseObservation(gymnasium.Wrapper, gymnasium.utils.RecordConstructorArg
         *,
         warm_up: str = "black",
     ) -> None:
+        from spikecam_env.envs.wrappers.observe import viewed  # imports scenes, which the denoiser itself spares
+
         gymnasium.utils.RecordConstructorArgs.__init__(self, mode=mode, output=output, warm_up=warm_up)
         super().__init__(env)
         space = env.observation_space
