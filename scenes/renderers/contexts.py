@@ -10,11 +10,12 @@ import ctypes
 import os
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import partial
 
 import numpy as np
 
+from scenes.renderers.egl import COMPATIBLE, CORE, EglContext, devices
 from scenes.renderers.pyrender_import import import_pyrender
+from spikecam_env.errors import NotReadyError
 from spikecam_env.forked import may_be_forked
 
 _PACKAGES = "install the system packages libegl1 and libgl1 (Debian, Ubuntu: apt-get install -y libegl1 libgl1)"
@@ -29,17 +30,33 @@ FIX = {
 
 _LIBRARIES = ("libEGL.so.1", "libOSMesa.so.8", "libOSMesa.so.6")
 _started_in: int | None = None
+_started: tuple[str, ...] | None = None
+"""Names of the library that draws in this process."""
 
-EGL_EXTENSIONS = 0x3055
-SOFTWARE = b"EGL_MESA_device_software"
+PROFILES = ("core", "compatible")
+"""Of OpenGL: core for pyrender, compatible (with its fixed functions) for MuJoCo."""
 
 
 @dataclass(frozen=True)
 class Context:
-    """A place to draw: `make_current()` before OpenGL calls, `end()` once."""
+    """A place to draw: `make_current()` before OpenGL calls, `release()` after them where several threads use it,
+    `end()` once."""
 
     make_current: Callable[[], None]
+    release: Callable[[], None]
     end: Callable[[], None]
+    function: Callable[[str], int | None]
+    """Address of a function of OpenGL by its name."""
+
+
+def start(kind: str, profile: str = "core") -> Context:
+    """A context of this kind, "egl-hardware", "egl-software" or "osmesa"; it is this thread's.
+
+    Args:
+        kind: of back-end; one process serves EGL or OSMesa, not both.
+        profile: of `PROFILES`.
+    """
+    return osmesa(profile) if kind == "osmesa" else egl(kind == "egl-software", profile)
 
 
 def can_start() -> bool:
@@ -52,35 +69,30 @@ def can_start() -> bool:
     return not (may_be_forked() and any(map(_is_loaded, _LIBRARIES)))
 
 
-def egl(software: bool) -> Context:
-    """A context on the first graphics card, or on the processor, that serves OpenGL 4.1.
+def egl(software: bool, profile: str = "core") -> Context:
+    """A context on the first graphics card, or on the processor, that serves it.
 
     Raises:
         RuntimeError: no device of this kind serves; errors of the libraries pass through.
     """
-    _load("libEGL.so.1", "libEGL.so")
-    import_pyrender("egl")
-    from OpenGL.EGL import eglDestroyContext
-    from pyrender.platforms import egl as platform
-
+    library = _load("libEGL.so.1", "libEGL.so")
+    if profile == "core":
+        import_pyrender("egl")
     failures = []
-    for device in platform.query_devices():
-        extensions = platform._eglQueryDeviceStringEXT(device._display, EGL_EXTENSIONS) or b""
-        if (SOFTWARE in extensions.split()) is not software:
-            continue
-        made = platform.EGLPlatform(1, 1, device=device)
+    for device in devices(library, software):
         try:
-            made.init_context()
-        except Exception as failure:
-            failures.append(f"{device.name or 'a device'}: {type(failure).__name__} {failure}".strip())
+            made = EglContext.on(library, device, CORE if profile == "core" else COMPATIBLE)
+            made.make_current()
+        except RuntimeError as failure:
+            failures.append(str(failure))
             continue
-        return Context(made.make_current, partial(eglDestroyContext, made._egl_display, made._egl_context))
+        return Context(made.make_current, made.release, made.end, made.function)
     kind = "software device" if software else "graphics card"
-    raise RuntimeError(f"EGL has no {kind} with OpenGL 4.1 ({'; '.join(failures) or 'none found'})")
+    raise RuntimeError(f"EGL has no {kind} that draws ({'; '.join(failures) or 'none found'})")
 
 
-def osmesa() -> Context:
-    """A context in Mesa's off-screen library: OpenGL 3.3 on the processor.
+def osmesa(profile: str = "core") -> Context:
+    """A context in Mesa's off-screen library, on the processor: OpenGL 3.3, or the newest with the fixed functions.
 
     The library is called directly: PyOpenGL 3.1.0, which pyrender asks for, lacks OSMesaCreateContextAttribs.
 
@@ -88,19 +100,21 @@ def osmesa() -> Context:
         RuntimeError: the library is missing, or makes no context.
     """
     library = _load("libOSMesa.so.8", "libOSMesa.so.6", "libOSMesa.so")
-    import_pyrender("osmesa")
-    from OpenGL.platform import PLATFORM
+    if profile == "core":
+        import_pyrender("osmesa")
+        from OpenGL.platform import PLATFORM
 
-    PLATFORM.GetCurrentContext.restype = ctypes.c_void_p  # PyOpenGL 3.1.0 looks contexts up, and its own have no hash
+        PLATFORM.GetCurrentContext.restype = ctypes.c_void_p  # PyOpenGL 3.1.0's own contexts have no hash
     library.OSMesaCreateContextAttribs.restype = ctypes.c_void_p
-    attributes = (ctypes.c_int * 11)(
+    library.OSMesaGetProcAddress.restype = ctypes.c_void_p
+    version = (0x33, 0x34, 0x36, 3, 0x37, 3)  # OSMESA_PROFILE: core, OSMESA_CONTEXT_MAJOR_VERSION, _MINOR_VERSION
+    attributes = (
         *(0x22, 0x1908),  # OSMESA_FORMAT: RGBA
         *(0x30, 24),  # OSMESA_DEPTH_BITS
-        *(0x33, 0x34),  # OSMESA_PROFILE: core
-        *(0x36, 3, 0x37, 3),  # OSMESA_CONTEXT_MAJOR_VERSION, _MINOR_VERSION
+        *(version if profile == "core" else (0x33, 0x35)),  # OSMESA_PROFILE: compatible
         0,
     )
-    handle = ctypes.c_void_p(library.OSMesaCreateContextAttribs(attributes, None))
+    handle = ctypes.c_void_p(library.OSMesaCreateContextAttribs((ctypes.c_int * len(attributes))(*attributes), None))
     if not handle:
         raise RuntimeError("OSMesa makes no OpenGL 3.3 context")
     unused = np.zeros((1, 1, 4), np.uint8)
@@ -110,7 +124,12 @@ def osmesa() -> Context:
             raise RuntimeError("OSMesa lost its context")
 
     make_current()
-    return Context(make_current, lambda: library.OSMesaDestroyContext(handle))
+    return Context(
+        make_current,
+        release=lambda: library.OSMesaMakeCurrent(None, None, 0, 0, 0),
+        end=lambda: library.OSMesaDestroyContext(handle),
+        function=lambda name: library.OSMesaGetProcAddress(name.encode()),
+    )
 
 
 def _is_loaded(library: str) -> bool:
@@ -122,11 +141,17 @@ def _is_loaded(library: str) -> bool:
 
 
 def _load(*names: str) -> ctypes.CDLL:
-    global _started_in
-    _started_in = os.getpid()
+    global _started_in, _started
+    if _started not in (None, names):
+        raise NotReadyError(
+            f"OpenGL is loaded from {(_started or names)[0]} and cannot change to {names[0]}; "
+            f"start a new process for {names[0]}"
+        )
+    _started_in, _started = os.getpid(), names
     for name in names:
         try:
             return ctypes.CDLL(name, mode=ctypes.RTLD_GLOBAL)
         except OSError:
             continue
+    _started = None
     raise RuntimeError(f"{names[0]} is not on this machine")

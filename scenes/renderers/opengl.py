@@ -55,7 +55,7 @@ class OpenGL:
     """
 
     def __init__(self, kind: str) -> None:
-        self._context = contexts.osmesa() if kind == "osmesa" else contexts.egl(software=kind == "egl-software")
+        self._context = contexts.start(kind)
         from OpenGL import GL
         from pyrender.shader_program import ShaderProgram
 

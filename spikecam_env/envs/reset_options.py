@@ -3,17 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from os import PathLike
 from typing import Any
 
-from scenes.protocol import MOST_PLACE
-from spikecam_env.checked import checked_numbers
+from scenes.protocol import MOST_LIGHT, MOST_PLACE
+from spikecam_env.checked import checked_number, checked_numbers
 from spikecam_env.errors import InputError, shown, unknown_name
+from spikecam_env.sensor import SensorModel
 
 Rule = Callable[[Any, str], Any]
 """(value, name) -> the value to use; raises InputError for an unusable one."""
 
 OF_EVERY = ("light", "model")
-"""Options of every environment, which `SpikeCameraEnv` takes before the scene gets the others."""
+"""Options of every environment, which `camera_options` takes before the scene gets the others."""
 
 
 def pair(value: Any, name: str) -> tuple[float, float]:
@@ -41,6 +43,46 @@ def checked_options(options: Any, rules: Mapping[str, Rule]) -> dict[str, Any]:
         if name not in rules:
             raise unknown_name("option of reset", name, (*rules, *OF_EVERY))
     return {name: rules[name](value, name) for name, value in given.items()}
+
+
+def camera_options(options: Any, usual: SensorModel) -> tuple[SensorModel, float, dict[str, Any]]:
+    """The options that every environment with a spike camera takes.
+
+    Args:
+        options: as a user gives them.
+        usual: the model of episodes that are given none.
+
+    Returns:
+        The model of the episode, the factor on its light, and the other options.
+
+    Raises:
+        InputError: for an unusable one, and for a model of another frame rate.
+
+    Example:
+        >>> camera_options({"light": 0.5, "angle": 1.0}, loaded_model("ideal"))[1:]
+        (0.5, {'angle': 1.0})
+    """
+    given = as_dictionary(options)
+    model = loaded_model(given.pop("model", usual))
+    if model.frame_rate_hz != usual.frame_rate_hz:
+        raise InputError(
+            f"model {model.name!r} has {model.frame_rate_hz} frames a second, the environment "
+            f"{usual.frame_rate_hz}; make the environment with a model of that rate"
+        )
+    return model, checked_number(given.pop("light", 1.0), "light", 0.0, MOST_LIGHT, above=True), given
+
+
+def loaded_model(model: Any) -> SensorModel:
+    """The model that a user gave: a preset's name, the path of a TOML file, or a SensorModel.
+
+    Raises:
+        InputError: for anything else.
+    """
+    if isinstance(model, SensorModel):
+        return model
+    if not isinstance(model, (str, PathLike)):
+        raise InputError(f"model is {shown(model)}; give a preset's name, the path of a TOML file, or a SensorModel")
+    return SensorModel.load(model)
 
 
 def as_dictionary(options: Any, name: str = "options") -> dict[str, Any]:

@@ -16,14 +16,14 @@ from numpy.typing import ArrayLike, NDArray
 from scenes.exposure import lit
 from scenes.flat.painted_disk import Plane
 from scenes.flat.planes import PlanarScene, painted_planes
-from scenes.protocol import MOST_LIGHT, Gaze, Scene
+from scenes.protocol import Gaze, Scene
 from scenes.renderers.shared import register_user, release_user
-from spikecam_env.checked import checked_memory, checked_number, checked_seed, checked_shape, checked_switch
+from spikecam_env.checked import checked_memory, checked_seed, checked_shape, checked_switch
 from spikecam_env.envs.action import checked_action
 from spikecam_env.envs.keywords import check_keywords
 from spikecam_env.envs.motor import turned
-from spikecam_env.envs.observations import Blocks, CameraView, Observation, observation, with_state, with_state_space
-from spikecam_env.envs.reset_options import as_dictionary
+from spikecam_env.envs.observations import Blocks, CameraView, Observation, ObservedStream, observation
+from spikecam_env.envs.reset_options import camera_options, loaded_model
 from spikecam_env.errors import InputError, NotReadyError, OwnCodeError, shown, unknown_name
 from spikecam_env.numbers import as_number
 from spikecam_env.sensor import Keyframes, SensorModel, SpikeSensor, step_together
@@ -134,7 +134,7 @@ class SpikeCameraEnv(gymnasium.Env[Any, NDArray[np.float32]]):
         if not 0 < as_number(rate) < np.inf:
             raise InputError(f"max_gaze_rate_px_s is {shown(rate)}; it must be positive and finite")
         self.max_gaze_rate_px_s = rate
-        self.model = _loaded(model)
+        self.model = loaded_model(model)
         self.ground_truth = checked_switch(ground_truth, "ground_truth")
         self.render_mode = render_mode
         self._make_scene, self._judge = make_scene, judge
@@ -142,7 +142,6 @@ class SpikeCameraEnv(gymnasium.Env[Any, NDArray[np.float32]]):
         self._sensor: SpikeSensor | None = self._unit_of(self.model, seed=0)
         self._scene: Scene | None = None
         self._drawn: Any = None  # the scene as it was drawn, in its own light
-        self._seen: Any = None
         self._blocks: Blocks | None = None
         self._camera_seed = 0  # of this episode
         self._gaze = Gaze.fixed(0.0, 0.0)  # the path of the block that is exposed last, or next
@@ -158,9 +157,9 @@ class SpikeCameraEnv(gymnasium.Env[Any, NDArray[np.float32]]):
             law: makes pictures of blocks of spikes.
             obs_state: whether gaze and age of the picture are observed beside it.
         """
+        self._observed = ObservedStream(law, self.view, obs_state=obs_state)
         self.observation, self.obs_state = law, obs_state
-        picture = self._picture_space = law.space(self.view)
-        self.observation_space: spaces.Space[Any] = with_state_space(picture) if obs_state else picture
+        self.observation_space: spaces.Space[Any] = self._observed.space
 
     def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[Any, dict[str, Any]]:
         """A new episode; `options` but for `model` and `light` go to `make_scene`."""
@@ -185,16 +184,14 @@ class SpikeCameraEnv(gymnasium.Env[Any, NDArray[np.float32]]):
             options: as of `reset`.
         """
         self._open()
-        given = as_dictionary(options)
-        model = self._checked_model(given.pop("model", self.model))
-        light = checked_number(given.pop("light", 1.0), "light", 0.0, MOST_LIGHT, above=True)
+        model, light, given = camera_options(options, self.model)
         super().reset(seed=None if seed is None else checked_seed(seed))
         register_user(self)
         self._drawn = self._checked(self._make_scene(self.np_random, given))
         self._scene = lit(self._drawn, light)
         self._camera_seed = int(self.np_random.integers(2**31))
         self._load(model, self._camera_seed)
-        self._seen = self.observation.start(self.view, 1)
+        self._observed.begin()
         self._recent = []
         self._gaze = Gaze((0.0, 0.0), (0.0, 0.0), (0.0, float(self.frames_per_step)))
 
@@ -230,8 +227,9 @@ class SpikeCameraEnv(gymnasium.Env[Any, NDArray[np.float32]]):
 
         May be called again; anything else after it raises NotReadyError.
         """
-        self._sensor = self._scene = self._drawn = self._seen = self._blocks = None
+        self._sensor = self._scene = self._drawn = self._blocks = None
         self._recent = []
+        self._observed.end()
         release_user(self)
 
     @property
@@ -307,13 +305,8 @@ class SpikeCameraEnv(gymnasium.Env[Any, NDArray[np.float32]]):
 
     def _shown(self) -> tuple[Any, dict[str, Any]]:
         """The observation of the last block, and its info."""
-        picture, self._seen = self.observation.step(self.blocks, self._seen)
-        _check_picture(picture, self._picture_space, self.observation)
-        age = float(np.asarray(self.observation.age(self._seen)).reshape(-1)[0])
-        info = self._info() | {"age": age} | self.observation.info(self.blocks, self._seen)[0]
-        if not self.obs_state:
-            return picture[0], info
-        return {name: array[0] for name, array in with_state(picture, self._gaze.stop, age).items()}, info
+        observation, own = self._observed.step(self.blocks, self._gaze.stop)
+        return observation, self._info() | own
 
     def _info(self) -> dict[str, Any]:
         gaze = self._gaze
@@ -328,16 +321,6 @@ class SpikeCameraEnv(gymnasium.Env[Any, NDArray[np.float32]]):
             info |= {"radiance": truth.radiance, "flow": truth.flow, "object_id": truth.object_id}
             info["poses"] = {name: np.array(pose) for name, pose in truth.poses.items()}
         return info
-
-    def _checked_model(self, model: SensorModel | str | PathLike[str]) -> SensorModel:
-        """The model of an episode; InputError where scenes of this environment are not of its frame rate."""
-        loaded = _loaded(model)
-        if loaded.frame_rate_hz != self.model.frame_rate_hz:
-            raise InputError(
-                f"model {loaded.name!r} has {loaded.frame_rate_hz} frames a second, the environment "
-                f"{self.model.frame_rate_hz}; make the environment with a model of that rate"
-            )
-        return loaded
 
     def _checked(self, scene: Scene) -> Scene:
         rate = self.model.frame_rate_hz
@@ -357,18 +340,6 @@ def _checked_verdict(verdict: Any) -> tuple[float, bool]:
     if not isfinite(number) or not isinstance(terminated, bool | np.bool_ | int):
         raise OwnCodeError(f"judge returned {shown(verdict)}; it must return (reward, terminated): a number and a bool")
     return number, bool(terminated)
-
-
-def _check_picture(picture: Any, space: spaces.Space[Any], law: Observation) -> None:
-    """Raise OwnCodeError where an observation is not one of its own space: arrays (1, ...) of its shape and type."""
-    if space.shape is None:
-        return
-    shape, dtype = getattr(picture, "shape", None), str(getattr(picture, "dtype", None)).removeprefix("torch.")
-    if shape != (1, *space.shape) or dtype != str(space.dtype):
-        raise OwnCodeError(
-            f"observation {type(law).__name__}: step returned {dtype} of shape {shape}; its space has {space.dtype} of "
-            f"{(1, *space.shape)}"
-        )
 
 
 def expose(
@@ -406,11 +377,3 @@ def _observation(obs: str | Observation | None, packed: bool, usual: str) -> Obs
     if packed and obs not in (None, "packed"):
         raise InputError(f"packed is True and obs is {shown(obs)}; give one of the two")
     return observation("packed" if packed else usual if obs is None else obs)
-
-
-def _loaded(model: SensorModel | str | PathLike[str]) -> SensorModel:
-    if isinstance(model, SensorModel):
-        return model
-    if not isinstance(model, (str, PathLike)):
-        raise InputError(f"model is {shown(model)}; give a preset's name, the path of a TOML file, or a SensorModel")
-    return SensorModel.load(model)

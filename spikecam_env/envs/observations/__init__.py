@@ -14,6 +14,7 @@ from spikecam_env.envs.observations.intervals import ISI, TFI
 from spikecam_env.envs.observations.playback import TFP
 from spikecam_env.envs.observations.protocol import Blocks, CameraView, Observation, replaced, restarted, with_rows
 from spikecam_env.envs.observations.state import with_state, with_state_space
+from spikecam_env.envs.observations.stream import ObservedStream
 from spikecam_env.envs.registration import OBSERVATIONS_ABOVE
 from spikecam_env.errors import InputError, shown, unknown_name
 from spikecam_env.renamed import old_names
@@ -29,6 +30,7 @@ __all__ = [
     "FrameCamera",
     "Multibinary",
     "Observation",
+    "ObservedStream",
     "Packed",
     "Spikes",
     "block_shape",

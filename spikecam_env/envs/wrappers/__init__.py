@@ -5,6 +5,7 @@
 
 from typing import Any
 
+from spikecam_env.envs.wrappers.any_env import SpikeCamera
 from spikecam_env.envs.wrappers.observe import ObserveSpikes, VectorObserveSpikes
 from spikecam_env.envs.wrappers.progress import ProgressReward, VectorProgressReward
 from spikecam_env.envs.wrappers.randomize import RandomizeLight, RandomizeSensor
@@ -14,6 +15,7 @@ __all__ = [
     "ProgressReward",
     "RandomizeLight",
     "RandomizeSensor",
+    "SpikeCamera",
     "VectorObserveSpikes",
     "VectorProgressReward",
 ]

@@ -20,8 +20,16 @@ from gymnasium.vector import AutoresetMode
 from gymnasium.vector.utils import batch_space
 from numpy.typing import ArrayLike, NDArray
 
-from spikecam_env.envs.observations import Blocks, CameraView, Observation, block_shape, observation, restarted
-from spikecam_env.envs.spike_camera import SpikeCameraEnv
+from spikecam_env.envs.observations import (
+    Blocks,
+    CameraView,
+    Observation,
+    ObservedStream,
+    block_shape,
+    observation,
+    restarted,
+)
+from spikecam_env.envs.wrappers.any_env import SpikeCamera, spike_camera_of
 from spikecam_env.errors import InputError, NotReadyError
 from spikecam_env.sensor import Keyframes
 
@@ -48,22 +56,19 @@ class ObserveSpikes(gymnasium.ObservationWrapper, gymnasium.utils.RecordConstruc
     def __init__(self, env: gymnasium.Env, obs: str | Observation) -> None:
         gymnasium.utils.RecordConstructorArgs.__init__(self, obs=obs)
         super().__init__(env)
-        self._law, self._view, self._state = observation(obs), viewed(env.observation_space, env), None
-        self.observation_space = self._law.space(self._view)
+        self._view = viewed(env.observation_space, env)
+        self._observed = ObservedStream(observation(obs), self._view)
+        self.observation_space = self._observed.space
 
     def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[Any, dict[str, Any]]:
         """Begin an episode, and with it another stream."""
-        self._state = self._law.start(self._view, 1)
+        self._observed.begin()
         return super().reset(seed=seed, options=options)
 
     def observation(self, observation: NDArray[Any]) -> Any:
         """The observation of a block."""
-        if self._state is None:
-            raise NotReadyError("the environment has not begun; call reset first")
         light, seeds = light_on(self.env)
-        blocks = Blocks(observation[None], light, self._view.frame_rate_hz, seeds)
-        picture, self._state = self._law.step(blocks, self._state)
-        return picture[0]
+        return self._observed.step(Blocks(observation[None], light, self._view.frame_rate_hz, seeds))[0]
 
 
 class VectorObserveSpikes(gymnasium.vector.VectorObservationWrapper):
@@ -113,15 +118,20 @@ def viewed(space: spaces.Space[Any], env: Any) -> CameraView:
     """The camera whose blocks fill a space.
 
     Raises:
-        InputError: where they are no blocks of spikes.
+        InputError: where they are no blocks of spikes, or not all frames of a step.
     """
     frames, rows, columns = block_shape(space)
-    one = getattr(env.unwrapped, "envs", [env])[0].unwrapped
-    rate = one.model.frame_rate_hz if isinstance(one, SpikeCameraEnv) else CameraView.frame_rate_hz
+    camera = spike_camera_of(getattr(env.unwrapped, "envs", [env])[0])
+    if isinstance(camera, SpikeCamera) and camera.frames_per_step != frames:
+        raise InputError(
+            f"the camera shows {frames} of the {camera.frames_per_step:g} frames of a step, and a law of spikes needs "
+            "all; give obs= to SpikeCamera itself, or block_frames= of the whole step"
+        )
+    rate = CameraView.frame_rate_hz if camera is None else camera.model.frame_rate_hz
     return CameraView((rows, columns), frames, rate)
 
 
 def light_on(env: gymnasium.Env) -> tuple[Sequence[Keyframes | ArrayLike], Sequence[int]]:
-    """The light on the sensor in the last step, and the camera's seed; both empty where it is no spike camera's."""
-    one = env.unwrapped
-    return (one.blocks.light, one.blocks.seeds) if isinstance(one, SpikeCameraEnv) else ((), ())
+    """The light on the sensor in the last step, and the camera's seed; both empty where there is no spike camera."""
+    camera = spike_camera_of(env)
+    return ((), ()) if camera is None else (camera.blocks.light, camera.blocks.seeds)

@@ -17,7 +17,7 @@ import numpy as np
 
 from scenes.protocol import MOST_LIGHT
 from spikecam_env.checked import checked_number
-from spikecam_env.envs.spike_camera import SpikeCameraEnv
+from spikecam_env.envs.wrappers.any_env import spike_camera_of
 from spikecam_env.errors import InputError, shown, unknown_name
 from spikecam_env.sensor import CATALOGUE, SensorModel
 from spikecam_env.sensor.model import generator
@@ -33,8 +33,10 @@ class _Randomize(gymnasium.Wrapper):
 
     def __init__(self, env: gymnasium.Env) -> None:
         super().__init__(env)
-        if not isinstance(env.unwrapped, SpikeCameraEnv):
+        camera = spike_camera_of(env)
+        if camera is None:
             raise InputError(f"the environment is {shown(env.unwrapped)}; it must be a spike camera's")
+        self._usual = camera.model
         self._rng = np.random.default_rng()
 
     def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[Any, dict[str, Any]]:
@@ -73,13 +75,12 @@ class RandomizeSensor(_Randomize, gymnasium.utils.RecordConstructorArgs):
     def __init__(self, env: gymnasium.Env, ranges: Ranges) -> None:
         gymnasium.utils.RecordConstructorArgs.__init__(self, ranges=ranges)
         super().__init__(env)
-        self._base: SensorModel = env.unwrapped.model  # type: ignore[attr-defined]
         self._ranges = {name: checked_range(name, limits) for name, limits in ranges.items()}
         for end in (0, 1):  # both ends of all ranges must make a model
-            with_parameters(self._base, {name: limits[end] for name, limits in self._ranges.items()})
+            with_parameters(self._usual, {name: limits[end] for name, limits in self._ranges.items()})
 
     def _draw(self, rng: np.random.Generator) -> SensorModel:
-        return with_parameters(self._base, {name: rng.uniform(*limits) for name, limits in self._ranges.items()})
+        return with_parameters(self._usual, {name: rng.uniform(*limits) for name, limits in self._ranges.items()})
 
 
 class RandomizeLight(_Randomize, gymnasium.utils.RecordConstructorArgs):
