@@ -161,7 +161,8 @@ def _exposed(keys: Keyframes, frames: int, parts: int) -> Pictures:
     exposed = np.zeros((frames, *keys.radiance.shape[1:]), np.float32)
     for part in range(parts):
         exposed += np.stack([keys.at(frame + (part + 0.5) / parts) for frame in range(frames)])
-    return exposed / np.float32(parts)
+    exposed /= np.float32(parts)
+    return exposed
 
 
 def _ms(run: Callable[[], object], repeats: int) -> float:

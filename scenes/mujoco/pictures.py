@@ -30,8 +30,8 @@ from spikecam_env.errors import InputError, NotReadyError, shown, unknown_name
 from spikecam_env.types import Pictures
 
 SUPERSAMPLE = 4
-"""Samples a pixel and axis: fewer leave edges that jump as things move; keys of a white ball on grey are then 0.9 %
-from eight times as many, with 3 it is 1.3 %, with 2 it is 1.9 % (`python -m benchmarks.mujoco_light`)."""
+"""Samples a pixel and axis: fewer leave edges that jump as things move; keys of a white ball on grey are then 0.8 %
+from eight times as many, with 3 it is 1.1 %, with 2 it is 1.9 % (`python -m benchmarks.mujoco_light`)."""
 MOST_SAMPLES = 8
 """Samples a pixel and axis at most: 64 a pixel."""
 MOST_GEOMS = 10_000
