@@ -10,6 +10,7 @@ Rectifiers and sums cost a pass over memory each, as much as a convolution of fe
 from __future__ import annotations
 
 from functools import lru_cache
+from typing import Any, cast
 
 import torch
 from torch import Tensor, nn
@@ -27,12 +28,12 @@ class FusedPicture(nn.Module):
     """(N, h, w, columns) squares of 2 x 2 pixels -> (4 (rates + 2) + HIDDEN, N, h, w) outputs without `biases`.
 
     Args:
-        network: whose weights are taken, as they are.
+        network: a `PictureDnSS`, whose weights are taken, as they are.
     """
 
-    def __init__(self, network: PictureDnSS) -> None:
+    def __init__(self, network: Any) -> None:
         super().__init__()
-        self.rates, self.dark, self.type = network.rates, network.dark, network.stem.weight.dtype
+        self.rates, self.dark, self.number_type = network.rates, network.dark, network.stem.weight.dtype
         parts = (network.stem.weight.flatten(1), network.carried.weight.flatten(1), network.conditions.weight)
         merged = torch.cat(parts, dim=1)
         self.columns = merged.shape[1] + -merged.shape[1] % COLUMNS
@@ -43,7 +44,8 @@ class FusedPicture(nn.Module):
         self.biases = torch.cat([network.out.bias, network.keep.bias]).float()
 
     def forward(self, squares: Tensor) -> Tensor:
-        network, streams = self.network, squares.shape[:3]
+        streams = squares.shape[:3]
+        network: Any = self.network
         z = _convolved(squares.permute(0, 3, 1, 2), self.stem, self.stem_bias)
         z = _layer(z, network.fine[0])
         coarse = _layer(z, network.coarse[0][0])
@@ -61,7 +63,7 @@ def prepared_picture(network: nn.Module, number_type: torch.dtype) -> nn.Module:
     return FusedPicture(mine) if isinstance(mine, PictureDnSS) and has_passes(mine) else mine
 
 
-def _layer(x: Tensor, convolution: nn.Conv2d, addend: Tensor | None = None) -> Tensor:
+def _layer(x: Tensor, convolution: Any, addend: Tensor | None = None) -> Tensor:
     """relu(convolution(x) + addend)."""
     return _convolved(x, convolution.weight, convolution.bias, convolution.stride[0], convolution.padding[0], addend)
 
@@ -78,10 +80,10 @@ def _convolved(
 def _fused(x: Tensor, weight: Tensor, bias: Tensor | None, stride: int, padding: int, addend: Tensor | None) -> Tensor:
     """The operators that torch's own compiler uses on processors."""
     how = (weight, bias, [padding] * 2, [stride] * 2, [1, 1], 1)
-    operator = torch.ops.mkldnn._convolution_pointwise
+    operator: Any = torch.ops.mkldnn._convolution_pointwise
     if addend is None:
-        return operator(x, *how, "relu", [], "")
-    return operator.binary(x, addend, *how, "add", None, "relu", [], "")
+        return cast("Tensor", operator(x, *how, "relu", [], ""))
+    return cast("Tensor", operator.binary(x, addend, *how, "add", None, "relu", [], ""))
 
 
 @lru_cache(maxsize=2)

@@ -31,7 +31,7 @@ from spikecam_env.sensor.compiled_tools.intrinsics import use_widest_vectors
 from spikecam_env.types import Pictures
 
 Floats: TypeAlias = NDArray[np.float32]
-FOURS = {2: np.uint64, 4: np.complex128}
+FOURS: dict[int, Any] = {2: np.uint64, 4: np.complex128}
 """Types that hold four of a network's numbers, by the bytes of one."""
 
 
@@ -85,9 +85,9 @@ def _fused_pass(
     half = streams, height // 2, width // 2
     if hidden is None:
         hidden = np.zeros((streams, HIDDEN, *half[1:]), np.float32)
-    squares = torch.empty((*half, network.columns), dtype=network.type)
+    squares = torch.empty((*half, network.columns), dtype=network.number_type)
     numbers = as_array(squares)
-    fours = numbers.view(FOURS[numbers.dtype.itemsize])
+    fours: NDArray[Any] = numbers.view(FOURS[numbers.dtype.itemsize])
 
     def squared(n: int, rows: slice) -> None:
         row = np.zeros((network.columns // 4, 4 * half[2]), numbers.dtype)

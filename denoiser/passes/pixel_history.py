@@ -191,7 +191,7 @@ class PixelHistory:
         def learned(pixels: slice) -> None:
             learn(
                 window.spikes[pixels], picture[pixels], self._last[pixels], window.frames, of_last, kept,
-                *self._sums[:, pixels], self._changed[pixels],
+                self._sums[0, pixels], self._sums[1, pixels], self._changed[pixels],
             )  # fmt: skip
 
         self._share(learned)
@@ -232,10 +232,11 @@ class PixelHistory:
         words = as_words(self._held[:frames][::-1])
         shares = np.asarray([1 - (1 - 1 / m) ** frames for m in self.layout.memories], np.float32)
 
+        recents, olds = self._bits
+
         def advanced(pixels: slice) -> None:
-            advance(
-                words, pixels.start, *self._bits[:, pixels], self._before[pixels], shares, self._means,
-            )  # fmt: skip
+            before = self._before[pixels]
+            advance(words, pixels.start, recents[pixels], olds[pixels], before, shares, self._means)
 
         self._share(advanced)
         self._held = self._held[frames:]
@@ -256,14 +257,15 @@ class PixelHistory:
         gain, dark = (nothing, nothing) if self.unit is None else (self.unit.gain.ravel(), self.unit.dark.ravel())
         means = self._means * weights
         spikes = np.empty(height * width, np.uint8)
+        recents, olds = self._bits
 
         def painted(_: int, rows: slice) -> None:
             paint(
-                rows.start, rows.stop, width, *self._bits, self._before, self.seen, look, instants, counts, widths,
-                means, self._last, *self._sums, self._changed, gain, dark, planes,
+                rows.start, rows.stop, width, recents, olds, self._before, self.seen, look, instants, counts, widths,
+                means, self._last, self._sums[0], self._sums[1], self._changed, gain, dark, planes,
             )  # fmt: skip
-            of_rows = slice(width * rows.start, width * rows.stop)
-            count(*self._bits[:, of_rows], look, look + frames, spikes[of_rows])
+            pixels = slice(width * rows.start, width * rows.stop)
+            count(recents[pixels], olds[pixels], look, look + frames, spikes[pixels])
 
         share_rows(painted, 1, height, planes.size)
         planes[:, :height, width:] = planes[:, :height, width - 1 : width]

@@ -162,7 +162,8 @@ def test_rewards_ends_infos_and_pictures_are_the_simulators() -> None:
     env = camera(obs_state=True)
     seen, info = env.reset(seed=0, options={"column": 8})
     assert set(seen) == {"picture", "age"} and seen["age"] == 0
-    assert info == {"column": 8, "time_s": FRAMES / 40_000, "frame": FRAMES, "age": 0.0}
+    bits = float(FRAMES * SHAPE[0] * SHAPE[1])
+    assert info == {"column": 8, "time_s": FRAMES / 40_000, "frame": FRAMES, "age": 0.0, "camera_bits": bits}
     outcomes = [env.step(action)[1:4] for action in (1, 0, 1)]
     assert outcomes == [(1.0, False, False), (0.0, False, True), (1.0, False, False)]
     np.testing.assert_array_equal(env.render(), env.unwrapped.render())  # type: ignore[arg-type]
