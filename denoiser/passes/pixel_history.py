@@ -184,8 +184,8 @@ class PixelHistory:
 
         def learned(pixels: slice) -> None:
             learn(
-                self._bits[0, pixels], self._bits[1, pixels], picture[pixels], self._last[pixels], look, frames, of_last, kept,
-                self._sums[0, pixels], self._sums[1, pixels], self._changed[pixels],
+                self._bits[0, pixels], self._bits[1, pixels], picture[pixels], self._last[pixels], look, frames,
+                of_last, kept, self._sums[0, pixels], self._sums[1, pixels], self._changed[pixels],
             )  # fmt: skip
 
         self._share(learned)
@@ -228,7 +228,8 @@ class PixelHistory:
 
         def advanced(pixels: slice) -> None:
             advance(
-                words, pixels.start, self._bits[0, pixels], self._bits[1, pixels], self._before[pixels], shares, self._means,
+                words, pixels.start, self._bits[0, pixels], self._bits[1, pixels], self._before[pixels], shares,
+                self._means,
             )  # fmt: skip
 
         self._share(advanced)
@@ -251,8 +252,8 @@ class PixelHistory:
 
         def painted(_: int, rows: slice) -> None:
             paint(
-                rows.start, rows.stop, width, self._bits[0], self._bits[1], self._before, self.seen, look, instants, counts,
-                widths, means, self._last, self._sums[0], self._sums[1], self._changed, gain, dark, planes,
+                rows.start, rows.stop, width, self._bits[0], self._bits[1], self._before, self.seen, look, instants,
+                counts, widths, means, self._last, self._sums[0], self._sums[1], self._changed, gain, dark, planes,
             )  # fmt: skip
 
         share_rows(painted, 1, height, planes.size)
