@@ -69,7 +69,7 @@ class Figures:
 
     seconds: float
     frames: int
-    """That came."""
+    """That were taken in, or wait."""
     lost: int
     """Frames."""
     pictures: int
@@ -182,7 +182,10 @@ class Session:
     def figures(self) -> Figures:
         until = self._ended_s if self._denoised_all.is_set() else time.perf_counter()
         seconds = until - self._start_s if self._start_s else 0.0
-        return Figures(seconds, self._taken, self._lost + self.live.lost, self._pictures, self._latency_s)
+        overwritten = self.live.lost  # in the ring, after they were taken from the source
+        return Figures(
+            seconds, self._taken - overwritten, self._lost + overwritten, self._pictures, self._latency_s
+        )  # fmt: skip
 
     def newest(self, after: Shown | None, timeout_s: float) -> Shown | None:
         """The newest picture, once it is another than `after`, within a time; None where there is none."""
