@@ -210,7 +210,7 @@ def test_frames_that_mode_picture_comes_too_late_for_are_lost_and_counted() -> N
     forgetful.push(pack_frames(spikes[1300:]))
     assert np.any(watching.picture() != forgetful.picture())
     assert (watching.lost, watching.free, watching.frame) == (1300 - 600, 400, 1500 - 1 - watching.latency)
-    assert np.any(watching.window.planes[..., -2]) and not np.any(forgetful.window.planes[..., -2])
+    assert np.any(watching.window.planes[-2]) and not np.any(forgetful.window.planes[-2])
 
 
 def test_mode_picture_shows_what_it_had_of_a_step_whose_rest_was_overwritten() -> None:

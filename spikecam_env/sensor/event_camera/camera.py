@@ -19,7 +19,17 @@ from spikecam_env.sensor.random_fields import Words, words
 
 @dataclass(frozen=True)
 class EventCameraState:
-    """An event camera mid-stream.  Picklable; nothing changes its arrays."""
+    """An event camera mid-stream.  Picklable; nothing changes its arrays.
+
+    Example:
+        >>> from spikecam_env.sensor import EventCamera
+        >>> camera = EventCamera(shape=(2, 3), seed=1)
+        >>> before = camera.state()
+        >>> first = camera.step(np.full((2, 3), 0.5), frames=40)
+        >>> camera.restore(before)
+        >>> camera.step(np.full((2, 3), 0.5), frames=40) == first
+        True
+    """
 
     pixel: EventPixel
     shape: tuple[int, int]
