@@ -90,6 +90,7 @@ def test_closing_one_renderer_leaves_the_other_alive(opengl: OpenGL, another_ope
 def test_a_surface_that_is_gone_is_given_back(opengl: OpenGL) -> None:
     from OpenGL import GL
 
+    gc.collect()  # surfaces of tests before
     surface = ball()
     picture(opengl, surface)
     texture = opengl._kept[surface].texture
