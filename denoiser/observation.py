@@ -24,8 +24,7 @@ from numpy.typing import NDArray
 from denoiser.many import ManyDnSS
 from denoiser.online import OnlineDnSS
 from denoiser.passes.pixel_history import STEPS
-from denoiser.passes.recipe import MODES, PictureRecipe
-from denoiser.weights import load_weights
+from denoiser.passes.recipe import MODES
 from spikecam_env.checked import checked_number
 from spikecam_env.envs.observations.protocol import Blocks, CameraView, Observation, checked_gamma, grey, picture_space
 from spikecam_env.types import Masks
@@ -157,10 +156,7 @@ def _denoiser(mode: str | os.PathLike[str], *, step: int | None = None, device: 
 
 
 def _read(mode: str | os.PathLike[str], step: int | None, device: str | None) -> OnlineDnSS:
-    """A denoiser of rates; the step is of networks of one picture a step alone."""
-    recipe, network, _ = load_weights(mode)
-    step = step if isinstance(recipe, PictureRecipe) else None
-    return OnlineDnSS(recipe, network, output="rate", step=step, device=device)
+    return OnlineDnSS.of_step(mode, step, output="rate", device=device)
 
 
 _shipped: Callable[..., OnlineDnSS] = lru_cache(maxsize=4 * len(MODES))(_read)

@@ -28,7 +28,7 @@ from denoiser.passes.infer import on_host
 from denoiser.passes.on_device import spikes_on, unpacked_on
 from denoiser.passes.passes import Passes, passes_of
 from denoiser.passes.pixel_map import PixelMap
-from denoiser.passes.recipe import AnyRecipe
+from denoiser.passes.recipe import AnyRecipe, PictureRecipe
 from denoiser.passes.window import check_like
 from denoiser.weights import digest, load_weights, pretrained_path
 from spikecam_env.calibration import Calibration
@@ -134,6 +134,12 @@ class OnlineDnSS:
         """With the weights of a checkpoint."""
         recipe, network, _ = load_weights(path)
         return cls(recipe, network, **options)
+
+    @classmethod
+    def of_step(cls, weights: str | os.PathLike[str], step: int | None, **options: Any) -> OnlineDnSS:
+        """With the weights of a mode or a checkpoint, and pictures of `step` frames where it gives one a step."""
+        recipe, network, _ = load_weights(weights)
+        return cls(recipe, network, step=step if isinstance(recipe, PictureRecipe) else None, **options)
 
     def another(self, output: str | None = None) -> OnlineDnSS:
         """A denoiser like this one for another stream, from its first frame, with the same weights; by default the same

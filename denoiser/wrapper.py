@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-from pathlib import Path
 from typing import Any
 
 import gymnasium
@@ -11,8 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from denoiser.online import OnlineDnSS
-from denoiser.passes.recipe import MODES, PictureRecipe
-from denoiser.weights import load_weights, pretrained_path
+from denoiser.passes.recipe import MODES
 from spikecam_env.errors import InputError, NotReadyError, unknown_name
 
 OUTPUTS = ("spikes", "rate")
@@ -138,11 +136,6 @@ def _denoiser(mode: Any, output: str, frames: int) -> OnlineDnSS:
                 f"make it with step={frames}"
             )
         return made
-    if isinstance(mode, str) and mode in MODES:
-        path = pretrained_path(mode)
-    elif isinstance(mode, os.PathLike) or (isinstance(mode, str) and mode.endswith(".pt")):
-        path = Path(mode)
-    else:
+    if not isinstance(mode, os.PathLike) and not (isinstance(mode, str) and (mode in MODES or mode.endswith(".pt"))):
         raise unknown_name("denoiser mode", mode, (*MODES, "the path of a checkpoint (.pt)", "an OnlineDnSS"))
-    recipe, network, _ = load_weights(path)
-    return OnlineDnSS(recipe, network, output=output, step=frames if isinstance(recipe, PictureRecipe) else None)
+    return OnlineDnSS.of_step(mode, frames, output=output)
