@@ -11,6 +11,7 @@ import scipy
 from numpy.typing import NDArray
 
 from denoiser.evaluate.metrics import psnr_db
+from spikecam_env.streams.pictures import tfp_film
 
 Frames = NDArray[np.floating] | NDArray[np.uint8]
 
@@ -97,12 +98,11 @@ def change_of_step(pictures: Frames, light: Frames) -> float:
     Returns:
         Of the second half of the frames, when a denoiser has learned its camera; NaN for fewer than two steps in it.
     """
-    late = np.asarray(pictures[len(pictures) // 2 :], np.float32)
+    late = pictures[len(pictures) // 2 :]
     if len(late) < 2 * STEP:
         return float("nan")
-    if pictures.dtype == np.uint8:
-        sums = np.cumsum(late, axis=0, dtype=np.float64)
-        late = ((sums[STEP:] - sums[:-STEP]) / STEP).astype(np.float32)
+    if late.dtype == np.uint8:
+        late = tfp_film(late, STEP)[STEP // 2 + 1 : 1 - STEP // 2]  # of whole windows
     change = late[STEP:] - late[:-STEP]
     return float(np.sqrt(np.square(change, dtype=np.float64).mean()) / light.mean(dtype=np.float64))
 

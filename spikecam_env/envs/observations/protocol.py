@@ -80,7 +80,7 @@ class Observation(ABC):
         return 0.0
 
     def info(self, blocks: Blocks, state: Any) -> list[dict[str, Any]]:
-        """What infos of this step say of the camera, a dictionary a stream.
+        """Info of this step about the camera, a dictionary a stream.
 
         Args:
             blocks: of the step.
