@@ -10,8 +10,8 @@ import gymnasium
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from spikecam_env.envs.aiming import AimingEnv
 from spikecam_env.envs.evaluation import Evaluation
+from spikecam_env.envs.judged import JudgedEnv
 from spikecam_env.envs.score import BASELINES, Policy, ends, play
 from spikecam_env.errors import InputError, shown
 
@@ -58,8 +58,8 @@ def policy_of(policy: Any) -> tuple[Policy, dict[str, Any]]:
 def acting(actor: Actor) -> Policy:
     """An actor, which forgets at the beginning of every episode."""
 
-    def policy(observation: Any, env: AimingEnv) -> ArrayLike:
-        if env.standing.step == 0:
+    def policy(observation: Any, env: JudgedEnv) -> ArrayLike:
+        if env.steps_played == 0:
             actor.begin()
         return actor.act(observation)
 
@@ -71,8 +71,8 @@ def _predicting(model: Any) -> Policy:
     known = signature(model.predict).parameters
     memory: list[Any] = [None]
 
-    def policy(observation: Any, env: AimingEnv) -> ArrayLike:
-        begins = env.standing.step == 0
+    def policy(observation: Any, env: JudgedEnv) -> ArrayLike:
+        begins = env.steps_played == 0
         memory[0] = None if begins else memory[0]
         given = {"state": memory[0], "episode_start": np.array([begins]), "deterministic": True}
         answer = model.predict(observation, **{name: value for name, value in given.items() if name in known})

@@ -35,7 +35,6 @@ from tqdm import tqdm
 from denoiser.training.resumable_run import Run
 from spikecam_env.agents.history import History
 from spikecam_env.agents.policy import Policy
-from spikecam_env.envs.oracle import oracle
 
 Cameras = VectorEnv[Any, Any, Any]
 Ended = tuple[float, ...]  # (return, performance, success) of an episode
@@ -166,7 +165,7 @@ class _Player:
     def _oracles(self) -> NDArray[np.float32]:
         """(N, A) actions of the oracle."""
         cameras: Any = self.envs.unwrapped
-        return np.stack([oracle(env.course) for env in cameras.envs])
+        return np.stack([env.unwrapped.best_action() for env in cameras.envs])
 
 
 def _gain(surprise: Tensor, over: Tensor, ppo: PPO) -> Tensor:

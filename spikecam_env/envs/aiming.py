@@ -12,9 +12,10 @@ from numpy.typing import ArrayLike, NDArray
 
 from scenes.protocol import Gaze, Scene
 from spikecam_env.envs.action import checked_action
-from spikecam_env.envs.course import Drive, StepOutcome
+from spikecam_env.envs.course import Drive, StepOutcome, steps_of
 from spikecam_env.envs.episode import Episode, Standing
 from spikecam_env.envs.motor import Motor
+from spikecam_env.envs.oracle import oracle
 from spikecam_env.envs.spike_camera import SpikeCameraEnv
 from spikecam_env.envs.task import OUTCOME, REWARDS
 from spikecam_env.errors import unknown_name
@@ -122,6 +123,21 @@ class AimingEnv(SpikeCameraEnv):
             options: of the task, without `model` and `light`.
         """
         return StepOutcome.begin(self._drive, self._draw_episode(np_random(seed)[0], options or {}))
+
+    @property
+    def steps_played(self) -> int:
+        """See `JudgedEnv.steps_played`."""
+        return self.standing.step
+
+    def best_action(self) -> NDArray[np.float32]:
+        """See `envs.oracle`."""
+        return oracle(self.course)
+
+    def ends_of(self, seed: int, most: int | None = None) -> tuple[float, float]:
+        """See `JudgedEnv.ends_of`; the oracle looks at places only, so courses are played alone (`envs.course`)."""
+        course, still = self.opening(seed), np.zeros(self.action_space.shape or (), np.float32)
+        nothing, best = ([course, *steps_of(course, act, most)][-1].performance for act in (lambda _: still, oracle))
+        return nothing, best
 
     def begin(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> None:
         """A new episode, with the camera at rest; see the class for the options."""

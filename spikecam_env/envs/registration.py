@@ -55,6 +55,16 @@ TASK_ENVIRONMENTS: dict[str, tuple[str, dict[str, Any]]] = {
 """As ENVIRONMENTS.  Their episodes end by themselves, in the task's time whatever `frames_per_step` is: so `spec` of an
 environment that was made has the right `max_episode_steps`, and the registered one has none."""
 
+MUJOCO_NAMES = ("Return",)
+"""As of `envs.mujoco_tasks.MUJOCO_TASKS`: tasks of `pip install 'spikecam-env[mujoco]'`."""
+
+MUJOCO_ENVIRONMENTS: dict[str, tuple[str, dict[str, Any]]] = {
+    f"spikecam_env/{name}{size}-v1": ("spikecam_env.envs.mujoco_tasks:make_task", {"task": name} | options)
+    for name in MUJOCO_NAMES
+    for size, options in (("", {}), ("-Full", {"shape": FULL_SHAPE}))
+}
+"""As TASK_ENVIRONMENTS; many are stepped by Gymnasium's own vector environments."""
+
 SMALL_TASKS = tuple(name for name in TASK_ENVIRONMENTS if "-Full" not in name)
 
 OBSERVATIONS_ABOVE: dict[str, tuple[str, dict[str, Any]]] = {}
@@ -80,3 +90,6 @@ def register() -> None:
             is_scene = name in ENVIRONMENTS
             steps, given = (MAX_EPISODE_STEPS, {**options, "steps": None}) if is_scene else (None, options)
             gymnasium.register(name, entry_point, max_episode_steps=steps, kwargs=given, vector_entry_point=vector)
+    for name, (entry_point, options) in MUJOCO_ENVIRONMENTS.items():
+        if name not in gymnasium.registry:
+            gymnasium.register(name, entry_point, kwargs=options)

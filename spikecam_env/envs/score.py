@@ -15,32 +15,32 @@ from typing import Any
 
 import gymnasium
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from tqdm import tqdm
 
 from spikecam_env.envs.action import checked_action
-from spikecam_env.envs.aiming import AimingEnv
-from spikecam_env.envs.course import StepOutcome, steps_of
-from spikecam_env.envs.oracle import oracle
+from spikecam_env.envs.judged import JudgedEnv
 from spikecam_env.errors import InputError
 
-Policy = Callable[[Any, AimingEnv], ArrayLike]
+Policy = Callable[[Any, JudgedEnv], ArrayLike]
 """(observation, environment) -> action.  An agent looks at the observation alone; the oracle at the environment."""
 
 
-def act_oracle(observation: Any, env: AimingEnv) -> ArrayLike:
-    """See `envs.oracle`."""
-    return oracle(env.course)
+def act_oracle(observation: Any, env: Any) -> ArrayLike:
+    """See `JudgedEnv.best_action`."""
+    best: ArrayLike = env.best_action()
+    return best
 
 
-def act_nothing(observation: Any, env: AimingEnv) -> ArrayLike:
+def act_nothing(observation: Any, env: Any) -> ArrayLike:
     """Zeros."""
     return np.zeros(env.action_space.shape or (), np.float32)
 
 
-def act_random(observation: Any, env: AimingEnv) -> ArrayLike:
+def act_random(observation: Any, env: Any) -> ArrayLike:
     """Evenly from the action space; `play` seeds it."""
-    return env.action_space.sample()
+    drawn: ArrayLike = env.action_space.sample()
+    return drawn
 
 
 BASELINES: dict[str, Policy] = {"oracle": act_oracle, "nothing": act_nothing, "random": act_random}
@@ -78,7 +78,7 @@ def play(env: gymnasium.Env[Any, Any], policy: Policy, seeds: Iterable[int], pro
     Raises:
         InputError: for an environment without a performance.
     """
-    inner = _aiming(env)
+    inner = judged_env(env)
     bar = tqdm(seeds, desc="episodes", unit="episode", leave=False, disable=None if progress is None else not progress)
     rows = [_episode(env, inner, policy, seed) for seed in bar]
     returns, performance, success, distance, seconds, steps = (np.array(column) for column in zip(*rows, strict=True))
@@ -93,11 +93,15 @@ def play(env: gymnasium.Env[Any, Any], policy: Policy, seeds: Iterable[int], pro
     )
 
 
-def _aiming(env: gymnasium.Env[Any, Any]) -> AimingEnv:
-    """The environment of this package below all wrappers; InputError where there is none."""
+def judged_env(env: gymnasium.Env[Any, Any]) -> Any:
+    """The bare environment, which is a `JudgedEnv`.
+
+    Raises:
+        InputError: for an environment whose episodes have no performance.
+    """
     inner = env.unwrapped
-    if not isinstance(inner, AimingEnv):
-        raise InputError(f"{type(inner).__name__} is no AimingEnv and has no performance; take an id of this package")
+    if not hasattr(type(inner), "best_action"):
+        raise InputError(f"{type(inner).__name__} has no performance and no oracle; give an id of this package")
     return inner
 
 
@@ -109,26 +113,19 @@ def score(performance: float, nothing: float, best: float) -> float:
 def ends(env: gymnasium.Env[Any, Any], seeds: Sequence[int]) -> tuple[list[float], list[float]]:
     """Performance of doing nothing and of the oracle: where a score is 0, and where it is 1.
 
-    They look at no pictures, so that no camera is exposed (`envs.course`).
+    They look at no pictures, so that no camera is exposed.
 
     Returns:
         (nothing's, the oracle's), of each episode.
     """
-    inner = _aiming(env)
-    still = np.zeros(inner.action_space.shape or (), np.float32)
+    inner = judged_env(env)
     most = None if env.spec is None else env.spec.max_episode_steps
-    first = [inner.opening(seed) for seed in seeds]
-    nothing, best = ([_end(course, act, most) for course in first] for act in (lambda _: still, oracle))
-    return nothing, best
-
-
-def _end(course: StepOutcome, act: Callable[[StepOutcome], NDArray[np.float32]], most: int | None) -> float:
-    """Performance at the end of an episode of `most` steps at most."""
-    return [course, *steps_of(course, act, most)][-1].performance
+    nothing, best = zip(*(inner.ends_of(seed, most) for seed in seeds), strict=True)
+    return list(nothing), list(best)
 
 
 def _episode(
-    env: gymnasium.Env[Any, Any], inner: AimingEnv, policy: Policy, seed: int
+    env: gymnasium.Env[Any, Any], inner: Any, policy: Policy, seed: int
 ) -> tuple[float, float, bool, float, float, int]:
     """(return, performance, success, distances' sum, seconds in steps, steps)."""
     inner.action_space.seed(seed)

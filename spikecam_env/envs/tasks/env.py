@@ -2,31 +2,28 @@
 
 from __future__ import annotations
 
-from copy import copy
 from dataclasses import replace
 from typing import Any, ClassVar
 
 import numpy as np
-from gymnasium.envs.registration import EnvSpec
 
-from spikecam_env.checked import checked_shape, checked_whole
+from spikecam_env.checked import checked_shape
 from spikecam_env.envs.aiming import AimingEnv
 from spikecam_env.envs.episode import Episode
 from spikecam_env.envs.keywords import check_settled
+from spikecam_env.envs.own_length import OwnLength
 from spikecam_env.envs.reset_options import Rule, checked_options
 from spikecam_env.envs.tasks import TASKS
 from spikecam_env.envs.tasks.base import CameraUnits, Task
+from spikecam_env.envs.tasks.splits import checked_split, drawn_number, episode_generator
 from spikecam_env.envs.tasks.things import TEST_PICTURES, TRAIN_PICTURES
 from spikecam_env.errors import InputError, shown, unknown_name
 
-SPLITS: dict[str, tuple[range, range]] = {
-    "train": (range(1_000_000), TRAIN_PICTURES),
-    "test": (range(1_000_000, 1_001_000), TEST_PICTURES),
-}
-"""Split -> (numbers that its episodes follow from, numbers of its textures).  Users count within a split, from 0."""
+PICTURES = {"train": TRAIN_PICTURES, "test": TEST_PICTURES}
+"""Split -> numbers of its textures."""
 
 
-class TaskEnv(AimingEnv):
+class TaskEnv(OwnLength, AimingEnv):
     """Plays a task; reward, end and info as of `AimingEnv`.  The observation is "tfp" where `obs` says nothing else.
 
     `spec.max_episode_steps` is `most_steps`; the task's time is `Task.duration_s`, whatever `frames_per_step` is.
@@ -55,7 +52,6 @@ class TaskEnv(AimingEnv):
 
     usual_obs: ClassVar[str] = "tfp"
     settles: ClassVar[tuple[str, ...]] = ("draw", "rise_s", "axes", "further")
-    _spec: EnvSpec | None = None
 
     def __init__(
         self,
@@ -71,7 +67,7 @@ class TaskEnv(AimingEnv):
         check_settled(type(self), camera)
         self.task = _task(task)
         self.answers = self.task.answers
-        self.split = _split(split)
+        self.split = checked_split(split)
         top = self.task.top_sides_s * min(checked_shape(shape))
         super().__init__(
             self._draw,
@@ -90,29 +86,16 @@ class TaskEnv(AimingEnv):
         """Steps of an episode at most."""
         return self._view_of(self.split).steps(self.task.duration_s)
 
-    @property
-    def spec(self) -> EnvSpec | None:
-        """Specification by `gymnasium.make`, with the task's own number of steps, which learners need."""
-        return self._spec
-
-    @spec.setter
-    def spec(self, made_of: EnvSpec | None) -> None:
-        self._spec = copy(made_of)
-        if self._spec is not None:
-            self._spec.max_episode_steps = self.most_steps
-
     def _draw(self, rng: np.random.Generator, options: dict[str, Any]) -> Episode:
-        rules: dict[str, Rule] = {"split": lambda value, name: _split(value), "episode": lambda value, name: value}
+        rules: dict[str, Rule] = {"split": checked_split, "episode": lambda value, name: value}
         given = checked_options(options, rules)
         split = given.get("split", self.split)
-        numbers, _ = SPLITS[split]
-        drawn = int(rng.integers(numbers.start, numbers.stop))
-        number = _within(split, given["episode"]) if "episode" in given else drawn - numbers.start
-        rng = np.random.default_rng([numbers.start + number, self.task.stream])
-        return replace(self.task.draw(rng, self._view_of(split)), number=number)
+        number = drawn_number(rng, split, given.get("episode"))
+        episode = self.task.draw(episode_generator(split, number, self.task.stream), self._view_of(split))
+        return replace(episode, number=number)
 
     def _view_of(self, split: str) -> CameraUnits:
-        return CameraUnits(self.shape, self.model.frame_rate_hz, self.frames_per_step, SPLITS[split][1])
+        return CameraUnits(self.shape, self.model.frame_rate_hz, self.frames_per_step, PICTURES[split])
 
     def _of_standing(self) -> dict[str, Any]:
         return super()._of_standing() | {"episode_number": self.episode.number}
@@ -128,19 +111,3 @@ def _task(task: str | Task) -> Task:
     if task not in TASKS:
         raise unknown_name("task", task, TASKS)
     return TASKS[task]()
-
-
-def _split(split: str) -> str:
-    if not isinstance(split, str) or split not in SPLITS:
-        raise unknown_name("split", split, SPLITS)
-    return split
-
-
-def _within(split: str, number: Any) -> int:
-    """A number of an episode that the split has."""
-    last = len(SPLITS[split][0]) - 1
-    try:
-        return checked_whole(number, "episode", 0, last)
-    except InputError:
-        has = f"the {split} split has episodes 0 to {last}"
-        raise InputError(f"episode = {shown(number)}; {has}, and it must be one of them") from None
