@@ -100,6 +100,7 @@ class MujocoTask(OwnLength):
         self.render_mode = render_mode
         self.model = mujoco.MjModel.from_xml_string(self.xml())
         self.data = mujoco.MjData(self.model)
+        mujoco.mj_forward(self.model, self.data)
         self._lamps = _Lamps(self.model)
         self._substeps = round(STEP_S / self.model.opt.timestep)
         self.action_space = spaces.Box(-1.0, 1.0, (self.actions,), np.float32)

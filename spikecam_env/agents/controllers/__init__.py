@@ -1,0 +1,1 @@
+"""Classical controllers of the MuJoCo tasks: they see pictures and encoders, and learn nothing; a file each."""
