@@ -45,9 +45,8 @@ class ReturnController:
     """
 
     def __init__(self, env: Return) -> None:
-        across, up = (env.places(np.array([0.0, *place])) for place in ((-REACH, 0.0), (0.0, REACH)))
-        self._middle = env.places(np.zeros(3))
-        self._px_a_reach = float(across[0] - self._middle[0])
+        self._middle, right_end = env.places(np.zeros(3)), env.places(np.array([0.0, -REACH, 0.0]))
+        self._px_a_reach = float(right_end[0] - self._middle[0])
         rows, columns = env.shape
         y, x = np.mgrid[:rows, :columns]
         right, above = (x - self._middle[0]) / self._px_a_reach, (self._middle[1] - y) / self._px_a_reach

@@ -18,7 +18,7 @@ from spikecam_env.envs.mujoco_tasks.return_ball import AWAY, BEND, CAN, LEVEL, R
 from spikecam_env.envs.mujoco_tasks.task import EYE, STEP_S
 
 
-def played(env: Return, seed: int, act: Any = None, level: int | None = None) -> list[dict[str, np.ndarray]]:
+def played(env: Return, seed: int, act: Any = None, level: int | None = None) -> list[dict[str, Any]]:
     """Places and speeds of an episode, step by step; act: () -> action, default none."""
     env.reset(seed=seed, options={} if level is None else {"level": level})
     rows, over = [], False
@@ -46,7 +46,7 @@ def test_a_ball_arrives_where_and_when_it_should_in_free_flight(level: int) -> N
 
 
 def test_spin_bends_the_way_as_much_at_every_speed() -> None:
-    sags = {level: [] for level in (1, 5)}
+    sags: dict[int, list[float]] = {1: [], 5: []}
     for level, its in sags.items():
         env = Return(level=level)
         for seed in range(20):
@@ -105,7 +105,7 @@ def test_the_same_seed_gives_the_same_bits_and_another_episode_others() -> None:
         for _ in range(5):
             spikes, *_ = env.step(np.ones(2))
         env.close()
-        return spikes
+        return np.asarray(spikes)
 
     assert np.array_equal(picture(1), picture(1))
     assert not np.array_equal(picture(1), picture(2))
@@ -125,7 +125,9 @@ def test_a_faster_level_is_darker_and_fuller() -> None:
 
 def test_the_classical_controller_returns_slow_balls_from_pictures() -> None:
     env = make_task("Return", level=1, split="test", obs_state=True, obs_inner=True)
-    player, won = ReturnController(env.unwrapped), []
+    task = env.unwrapped
+    assert isinstance(task, Return)
+    player, won = ReturnController(task), []
     for seed in range(4):
         seen, _ = env.reset(seed=seed)
         player.begin()
