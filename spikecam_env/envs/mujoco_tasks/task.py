@@ -82,6 +82,8 @@ class MujocoTask(OwnLength):
     """Numbers of an action."""
     sensed_numbers: ClassVar[int]
     """Numbers that the encoders measure."""
+    answers: ClassVar[int] = 0
+    """Answers that an action can give, its last numbers, after the number that says one."""
     stream: ClassVar[int]
     """Stream of random numbers, another of every task."""
 
