@@ -76,7 +76,7 @@ class Study:
 
 SIGHTS: dict[str, dict[str, Any]] = {
     **{obs: {"obs": obs} for obs in ("tfp", "root_tfp", "tfi", "spikes", "rate", "dim_rate", "root_rate")},
-    **{obs: {"obs": obs} for obs in ("frame30", "frame1000")},
+    **{f"{scale}frame{rate}": {"obs": f"{scale}frame{rate}"} for rate in (30, 120, 1000) for scale in ("", "root_")},
     "clean": {"obs": "tfp", "model": "ideal"},
     "root_clean": {"obs": "root_tfp", "model": "ideal"},
 }

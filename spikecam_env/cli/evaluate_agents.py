@@ -45,7 +45,7 @@ class Agents:
         "tracker",
     )
     """Observations: tfp, tfi, spikes, rate (denoised), dim_rate (the same, brighter), clean (no noise), root_tfp,
-    root_rate and root_clean (on a root scale, for the dark), frame30, frame1000.  Without training: tracker (classical,
+    root_rate and root_clean (on a root scale, for the dark), frame30, frame120, frame1000, root_frame30 ...  Without training: tracker (classical,
     sees tfp), tracker-rate, tracker-clean; shipped (the task's shipped agent, trained on tfp, sees it), shipped-rate,
     shipped-clean."""
     intervals: tuple[float, ...] = ()

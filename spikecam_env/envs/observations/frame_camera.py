@@ -92,9 +92,8 @@ class FrameCamera(Observation):
     Info has `camera_bits`, those of the sensor's converter a pixel and whole frame.
 
     Raises:
-        InputError: for a rate, an exposure or a white that is not above 0, an exposure longer than the period, a gamma
-            that is not above 0 and at most 1, a row time below 0, a sensor that is no `FrameSensor`, a `noise` that is
-            neither True nor False; for a read-out longer than the period; and in `step` where the light is not known.
+        InputError: for a value out of range, a sensor that is no `FrameSensor`, an exposure or a read-out longer than
+            the period, and in `step` where the light is not known.
 
     Example:
         >>> law, view = FrameCamera(1000.0, noise=False), CameraView((2, 3), 40)
