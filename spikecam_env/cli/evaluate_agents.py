@@ -45,9 +45,9 @@ class Agents:
         "tracker",
     )
     """Observations: tfp, tfi, spikes, rate (denoised), dim_rate (the same, brighter), clean (no noise), root_tfp,
-    root_rate and root_clean (on a root scale, for the dark), frame30, frame120, frame1000, root_frame30 ...  Without training: tracker (classical,
-    sees tfp), tracker-rate, tracker-clean; shipped (the task's shipped agent, trained on tfp, sees it), shipped-rate,
-    shipped-clean."""
+    root_rate and root_clean (on a root scale, for the dark), frame30, frame120, frame1000, root_frame30 ...  Without
+    training: tracker (classical, sees tfp), tracker-rate, tracker-clean; shipped (the task's shipped agent, trained on
+    tfp, sees it), shipped-rate, shipped-clean."""
     intervals: tuple[float, ...] = ()
     """Mean intervals [frames] at which each task is played, each a row, and learned.  Default: the task's own light."""
     trained: tuple[float, float] | None = None
