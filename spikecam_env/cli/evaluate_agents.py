@@ -46,7 +46,8 @@ class Agents:
         "classical",
     )
     """Observations: tfp, tfi, spikes, rate (denoised), dim_rate (the same, brighter), clean (no noise), root_tfp,
-    root_rate and root_clean (on a root scale, for the dark), frame30, frame1000, events; see docs/observations.md.
+    root_rate and root_clean (on a root scale, for the dark), frame30, frame120,
+    frame1000, root_frame30 ..., events; see docs/observations.md.
     Without training: classical (the task's classical player, sees tfp), classical-rate, classical-clean; shipped (the
     task's shipped agent, trained on tfp, sees it), shipped-rate, shipped-clean; oracle, nothing and random."""
     intervals: tuple[float, ...] = ()

@@ -27,7 +27,8 @@ class TrainAgent:
     """Folder of the run: agent.pt, curve.json, and last.pt to go on from."""
     obs: str = "tfp"
     """Observation: tfp, tfi, spikes, rate (denoised), dim_rate (the same, brighter), clean (no noise), root_tfp,
-    root_rate or root_clean (on a root scale, for the dark), frame30, frame1000 or events (docs/observations.md)."""
+    root_rate or root_clean (on a root scale, for the dark), frame30, frame120, frame1000,
+    root_frame30 ... or events (docs/observations.md)."""
     steps: Count | None = None
     """Steps of all environments together.  Default: as many as the shipped agents had."""
     seed: Seed = 0
