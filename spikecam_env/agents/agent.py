@@ -77,8 +77,13 @@ class Agent:
         return cls(task, obs, policy, training)
 
     def save(self, path: str | os.PathLike[str]) -> None:
-        """Write a file, which appears whole; weights are rounded to float16, one part in a thousand."""
-        weights = {name: tensor.detach().half().contiguous() for name, tensor in self.policy.state_dict().items()}
+        """Write a file, which appears whole; weights are rounded to float16, one part in a thousand.
+
+        What is beyond float16 is cut: the variance of a slow camera's age, which only training uses.
+        """
+        most = torch.finfo(torch.float16).max
+        state = self.policy.state_dict()
+        weights = {name: tensor.detach().clamp(-most, most).half().contiguous() for name, tensor in state.items()}
         values = {"task": self.task, "obs": self.obs, "recipe": self.policy.recipe.model_dump(), "weights": weights}
         write_whole(path, {"format": FORMAT, **values, "training": self.training})
 

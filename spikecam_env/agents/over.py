@@ -102,8 +102,9 @@ def rows_over(results: Sequence[Result], over: Over) -> list[dict[str, Any]]:
             row |= {name: str(mean_of_seeds([*its.values()])) if its else None for name, its in figures.items()}
             row |= {f"{name} - {series[0]}": _gain(figures[name], figures[series[0]]) for name in series[1:]}
             bits = {name: mean_known(result.camera_bits_s for result in its) for name, its in own.items()}
-            rows.append(row | {f"{name} [Mbit/s]": f"{its / 1e6:.3g}" for name, its in bits.items() if its is not None})
-    return rows
+            rows.append(row | {f"{name} [Mbit/s]": None if its is None else its / 1e6 for name, its in bits.items()})
+    empty = {f"{name} [Mbit/s]" for name in series if all(row[f"{name} [Mbit/s]"] is None for row in rows)}
+    return [{name: value for name, value in row.items() if name not in empty} for row in rows]
 
 
 def draw_over(results: Sequence[Result], over: Over, path: Path) -> None:

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import MISSING, dataclass, fields, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import tyro
 
 from spikecam_env.cli.options import Size
+from spikecam_env.errors import unknown_name
 from spikecam_env.numbers import WholeRange, Workers
 
 if TYPE_CHECKING:
@@ -79,10 +80,25 @@ class Agents:
     ray: Annotated[str | None, tyro.conf.arg(metavar="ADDRESS")] = None
     """Train on a Ray cluster: its address, or `local` for one of --jobs workers here."""
 
+    suite: Annotated[str | None, tyro.conf.arg(metavar="NAME")] = None
+    """A suite, v1, in place of tasks, observations, levels, learners, seeds, steps, episodes (docs/leaderboard.md)."""
+    entry: Annotated[str | None, tyro.conf.arg(metavar="NAME")] = None
+    """Write NAME.json too, an entry of the leaderboard (docs/leaderboard.md)."""
     films: bool = False
     """Write a film of the first test episode of each, TASK-NAME-SEED.mp4, of the first seed."""
 
     def run(self) -> None:
+        (self if self.suite is None else self._of_suite(self.suite))._run()
+
+    def _of_suite(self, name: str) -> Agents:
+        """The same with the options of a suite."""
+        from spikecam_env.agents.suite import SUITES
+
+        if name not in SUITES:
+            raise unknown_name("suite", name, SUITES)
+        return replace(self, suite=None, **vars(SUITES[name]))
+
+    def _run(self) -> None:
         from spikecam_env.agents.report import draw_curves
         from spikecam_env.agents.study import cases, study
 
@@ -107,6 +123,8 @@ class Agents:
         if self.points:
             draw_curves(results, self.out / "curves.png")
             written.append("curves.png")
+        if self.entry is not None:
+            written.append(self._write_entry(results, self.entry))
         if self.films:
             self._film([result.case for result in results if result.case.seed == self.first_seed])
         print(f"wrote {', '.join(written)} in {self.out}")
@@ -130,6 +148,25 @@ class Agents:
                 draw_over(results, over, self.out / f"{name}.png")
                 written += [f"{name}.md", f"{name}.png"]
         return written
+
+    def _write_entry(self, results: list[Result], name: str) -> str:
+        """Write the entry of the leaderboard, and give the name of its file."""
+        from spikecam_env.agents.leaderboard import entry_of
+        from spikecam_env.whole import write_text_whole
+
+        own = entry_of(results, name, self._command())
+        write_text_whole(self.out / f"{name}.json", own.model_dump_json(indent=1) + "\n")
+        return f"{name}.json"
+
+    def _command(self) -> str:
+        """The command line that gives these options."""
+        words = ["spikecam evaluate agents"]
+        for option in fields(self):
+            value = getattr(self, option.name)
+            if option.default is MISSING or value != option.default:
+                words.append("--" + option.name.replace("_", "-"))
+                words += [str(one) for one in (value if isinstance(value, tuple) else [value]) if value is not True]
+        return " ".join(words)
 
     def _film(self, played: list[StudyRun]) -> None:
         from spikecam_env.agents.report import pictures
