@@ -77,10 +77,8 @@ class Agent:
         return cls(task, obs, policy, training)
 
     def save(self, path: str | os.PathLike[str]) -> None:
-        """Write a file, which appears whole; weights are rounded to float16, one part in a thousand.
-
-        What is beyond float16 is cut: the variance of a slow camera's age, which only training uses.
-        """
+        """Write a file, which appears whole; weights are rounded to float16, one part in a thousand."""
+        # beyond float16 is the variance of a slow camera's age, which only training uses
         most = torch.finfo(torch.float16).max
         state = self.policy.state_dict()
         weights = {name: tensor.detach().clamp(-most, most).half().contiguous() for name, tensor in state.items()}

@@ -13,6 +13,7 @@ from denoiser.training.resumable_run import Run
 from spikecam_env.agents import evaluate, learner_sb3
 from spikecam_env.agents import study as studies
 from spikecam_env.agents.agent import Agent
+from spikecam_env.agents.controllers import classical
 from spikecam_env.agents.history import History
 from spikecam_env.agents.ppo import PPO, train
 from spikecam_env.agents.training import Study, learner, recipe_of, train_agent
@@ -136,3 +137,21 @@ def test_a_model_of_stable_baselines3_is_trained_once(tmp_path: Path, monkeypatc
     monkeypatch.setattr(learner_sb3, "find_spec", lambda name: None)
     with pytest.raises(InputError, match="stable-baselines3 is not installed"):
         learner_sb3.train_sb3(study, tmp_path, 64)
+
+
+def test_the_classical_player_returns_most_slow_balls() -> None:
+    """Of level 1, whose balls take 300 ms: it knows how the task is made, and sees pictures."""
+    study = Study("Return-v1", options={"level": 1})
+    env = study.make(split="test")
+    result = evaluate(classical(env.unwrapped), "Return-v1", episodes=4, **study.keywords)
+    print(result)
+    assert result.success >= 0.5
+    env.close()
+
+
+def test_an_episode_of_a_mujoco_task_becomes_a_film(tmp_path: Path, monkeypatch, capsys) -> None:
+    monkeypatch.chdir(tmp_path)
+    line = ["play", "Return-v1", "--size", "16", "16", "--film", "return.mp4", "--slow", "40"]
+    assert command([*line, "--policy", "oracle"]) == 0 and (tmp_path / "return.mp4").stat().st_size > 1000
+    assert "yes" in capsys.readouterr().out
+    assert command([*line[:-2], "--policy", "keyboard"]) == 2 and "--policy oracle" in capsys.readouterr().err
