@@ -34,26 +34,40 @@ def read_film(path: Path) -> tuple[list[Image.Image], float]:
         return [frame.to_image() for frame in film.decode(video=0)], float(rate)
 
 
-def main() -> None:
-    """Run the demo, and write its film as an animated WebP."""
-    with tempfile.TemporaryDirectory() as folder:
-        subprocess.run([sys.executable, "-m", "spikecam_env", "demo", "--no-open", "--out", folder], check=True)
-        pictures, rate = read_film(Path(folder, "demo.mp4"))
-    size = (WIDTH, round(WIDTH * pictures[0].height / pictures[0].width))
-    first, *others = [picture.resize(size, Image.Resampling.LANCZOS) for picture in pictures]
-    with whole_file(PICTURE) as beside:
+def write_webp(path: Path, pictures: list[Image.Image], ms: float) -> None:
+    """Write a moving picture.
+
+    Args:
+        path: of the file, which appears whole.
+        pictures: of one size.
+        ms: time of a picture [ms].
+
+    Raises:
+        InputError: where the file is larger than LARGEST.
+    """
+    first, *others = pictures
+    with whole_file(path) as beside:
         first.save(
             beside,
             format="WEBP",
             save_all=True,
             append_images=others,
-            duration=round(1000 / rate),
+            duration=round(ms),
             loop=0,
             quality=QUALITY,
             method=6,
         )
         if beside.stat().st_size > LARGEST:
             raise InputError(f"the picture has {beside.stat().st_size} bytes; {LARGEST} are the most: lower QUALITY")
+
+
+def main() -> None:
+    """Run the demo, and write its film as an animated WebP."""
+    with tempfile.TemporaryDirectory() as folder:
+        subprocess.run([sys.executable, "-m", "spikecam_env", "demo", "--no-open", "--out", folder], check=True)
+        pictures, rate = read_film(Path(folder, "demo.mp4"))
+    size = (WIDTH, round(WIDTH * pictures[0].height / pictures[0].width))
+    write_webp(PICTURE, [picture.resize(size, Image.Resampling.LANCZOS) for picture in pictures], 1000 / rate)
     print(f"{PICTURE.name}: {len(pictures)} pictures of {size[0]} x {size[1]}, {PICTURE.stat().st_size / 1e6:.2f} MB")
 
 

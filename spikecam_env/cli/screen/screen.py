@@ -26,7 +26,7 @@ BRIGHT_PERCENT = 99.5
 
 @dataclass(frozen=True)
 class PicturePanel:
-    """A picture (H, W) in linear radiance with a title and a line below it."""
+    """A picture (H, W), or (H, W, 3) in colour, in linear radiance with a title and a line below it."""
 
     picture: NDArray[np.floating]
     title: str
@@ -59,7 +59,7 @@ def compose(
     Returns:
         (rows, columns, 3) uint8, even sizes.
     """
-    (height, width), columns = panels[0].picture.shape, min(columns or len(panels), len(panels))
+    (height, width), columns = panels[0].picture.shape[:2], min(columns or len(panels), len(panels))
     scale = panel_scale(width)
     across, down = width * scale + MARGIN, _even(height * scale + 2 * MARGIN + CAPTION + STATUS)
     beside = _even(columns * across + MARGIN)
@@ -113,7 +113,7 @@ def _caption(draw: ImageDraw.ImageDraw, panel: PicturePanel, left: int, top: int
 
 
 def _mark(draw: ImageDraw.ImageDraw, panel: PicturePanel, left: int, top: int, scale: int) -> None:
-    height, width = (size * scale for size in panel.picture.shape)
+    height, width = (size * scale for size in panel.picture.shape[:2])
     if panel.aim:
         x, y = left + width / 2, top + height / 2
         draw.line((x - 8, y, x + 8, y), AIM)
