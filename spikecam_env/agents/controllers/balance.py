@@ -13,26 +13,19 @@ from __future__ import annotations
 from typing import Any
 
 import cv2
+import gymnasium
 import numpy as np
 from numpy.typing import NDArray
 
-from spikecam_env.envs.mujoco_tasks.balance import (
-    BEGIN,
-    GRAVITY,
-    LEVEL,
-    REST,
-    STRONGEST,
-    Balance,
-    fall_time,
-    steered,
-)
+from spikecam_env.envs.mujoco_tasks.balance import BEGIN, LEVEL, REST, STRONGEST, Balance, motor
 from spikecam_env.envs.mujoco_tasks.task import STEP_S
+from spikecam_env.envs.mujoco_tasks.upright import GRAVITY, fall_time, held_up
 from spikecam_env.errors import InputError, shown
 from spikecam_env.types import Floats
 
 FRAMES = 40
 """Of a picture: spikes are its values over 255 times this many."""
-LOG_RATIO = 0.7
+LOG_RATIO = 0.35
 """Of the rates on the rod and on the wall: their light has the ratio 4, less where the rod covers part of a pixel."""
 GRID = np.linspace(-4.0, 4.0, 33)
 """Angles that are tried [standard deviations of the prior]."""
@@ -58,11 +51,10 @@ class BalanceController:
         >>> env.close()
     """
 
-    def __init__(self, env: Balance) -> None:
-        lowest, highest = getattr(env, "levels", (None, None))
-        if not isinstance(env, Balance) or lowest != highest:
-            raise InputError(f"env is {shown(env)} of the levels {lowest} to {highest}; give Balance of one level")
-        numbers = LEVEL[lowest]
+    def __init__(self, env: gymnasium.Env[Any, Any]) -> None:
+        if not isinstance(env, Balance) or env.levels[0] != env.levels[1]:
+            raise InputError(f"env is {shown(env)}; give the bare Balance of one level, env.unwrapped")
+        numbers = LEVEL[env.levels[0]]
         self._length, self._time, self._reach = numbers.length, fall_time(numbers.length), numbers.reach
         self._pixels = env.shape[0] / numbers.view  # of the rod
         self._middle = (env.shape[1] - 1) / 2, (env.shape[0] - 1 + self._pixels) / 2
@@ -81,7 +73,8 @@ class BalanceController:
         place, speed = observation["inner"] * (self._reach, np.sqrt(GRAVITY * self._length))
         self._predict()
         self._correct(observation["picture"][0], place)
-        action = steered(place, speed, *self._mean, self._length)
+        angle, rate = self._mean
+        action = motor(held_up(place, speed, angle, rate, self._length))
         self._action = float(action[0])
         return action
 
