@@ -26,7 +26,7 @@ from denoiser.ground.plain_torch import read_plain, tensors_like
 from denoiser.weights import write_whole
 from spikecam_env.agents.history import History
 from spikecam_env.agents.policy import Policy, PolicyRecipe
-from spikecam_env.envs.registration import TASK_ENVIRONMENTS, register
+from spikecam_env.envs.registration import ALL_TASKS, MUJOCO_ENVIRONMENTS, register
 from spikecam_env.errors import InputError, unknown_name
 from spikecam_env.untrusted import declared
 
@@ -35,7 +35,7 @@ ENDING = ".pt"
 
 
 class Agent:
-    """A trained policy; its observations are those of environments with `obs=obs, obs_state=True`.
+    """A trained policy; its observations are those of environments with the keywords `sees`.
 
     Args:
         task: an id, e.g. "Catch-v1".
@@ -78,14 +78,22 @@ class Agent:
 
     def save(self, path: str | os.PathLike[str]) -> None:
         """Write a file, which appears whole; weights are rounded to float16, one part in a thousand."""
-        weights = {name: tensor.detach().half().contiguous() for name, tensor in self.policy.state_dict().items()}
+        # beyond float16 is the variance of a slow camera's age, which only training uses
+        most = torch.finfo(torch.float16).max
+        state = self.policy.state_dict()
+        weights = {name: tensor.detach().clamp(-most, most).half().contiguous() for name, tensor in state.items()}
         values = {"task": self.task, "obs": self.obs, "recipe": self.policy.recipe.model_dump(), "weights": weights}
         write_whole(path, {"format": FORMAT, **values, "training": self.training})
 
     def make(self, **options: Any) -> gymnasium.Env[Any, Any]:
         """An environment of its task, as it sees it; options: of the environment, e.g. split="test"."""
         register()
-        return gymnasium.make(f"spikecam_env/{self.task}", **{"obs": self.obs, "obs_state": True, **options})
+        return gymnasium.make(f"spikecam_env/{self.task}", **{**self.sees, **options})
+
+    @property
+    def sees(self) -> dict[str, Any]:
+        """Keywords of its environment."""
+        return {"obs": self.obs, **state_keywords(self.task)}
 
     def begin(self) -> None:
         """Forget all observations: the next one is the first of an episode, everywhere."""
@@ -95,7 +103,7 @@ class Agent:
         """The action (A,), the policy's mean; with a leading axis N where the observation has one.
 
         Args:
-            observation: picture, gaze and age.
+            observation: picture, gaze and age; of MuJoCo tasks picture, inner and age.
             fresh: (N,) which of N are the first of an episode.
 
         Raises:
@@ -113,15 +121,29 @@ class Agent:
     def _checked(self, observation: Any) -> bool:
         """Whether it is of many environments."""
         recipe = self.policy.recipe
-        expected = (recipe.channels, *recipe.shape)
-        if not isinstance(observation, dict) or set(observation) != {"picture", "gaze", "age"}:
+        expected, place = (recipe.channels, *recipe.shape), "inner" if recipe.sensed else "gaze"
+        if not isinstance(observation, dict) or set(observation) != {"picture", place, "age"}:
+            keywords = "obs_state=True" + ", obs_inner=True" * bool(recipe.sensed)
             raise InputError(
-                "an agent acts on observations with picture, gaze and age; make the task with obs_state=True"
+                f"this agent acts on observations with picture, {place} and age; make the task with {keywords}"
             )
         shape = np.shape(observation["picture"])
         if shape[-3:] != expected or len(shape) not in (3, 4):
             raise InputError(f"a picture has shape {shape}; this agent sees {expected}, of obs={self.obs!r}")
         return len(shape) == 4
+
+
+def state_keywords(task: str) -> dict[str, bool]:
+    """Keywords of environments that give the picture's age, and the gaze or what encoders measure, beside the picture.
+
+    Args:
+        task: an id, without `spikecam_env/`.
+
+    Example:
+        >>> state_keywords("Catch-v1"), state_keywords("Return-v1")
+        ({'obs_state': True}, {'obs_state': True, 'obs_inner': True})
+    """
+    return {"obs_state": True} | ({"obs_inner": True} if f"spikecam_env/{task}" in MUJOCO_ENVIRONMENTS else {})
 
 
 def shipped() -> list[str]:
@@ -152,6 +174,6 @@ def _path(source: str | os.PathLike[str]) -> Path:
     name = str(source).removeprefix("spikecam_env/")
     if name in shipped():
         return _folder() / f"{name}{ENDING}"
-    if f"spikecam_env/{name}" in TASK_ENVIRONMENTS or not is_file(name):
+    if f"spikecam_env/{name}" in ALL_TASKS or not is_file(name):
         raise unknown_name("agent", name, shipped())
     return Path(source)

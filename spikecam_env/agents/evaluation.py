@@ -18,7 +18,7 @@ from spikecam_env.agents.playing import episodes_of, judged, policy_of
 from spikecam_env.checked import checked_count, checked_seed
 from spikecam_env.envs.evaluation import Evaluation
 from spikecam_env.envs.observations import Observation
-from spikecam_env.envs.registration import ENVIRONMENTS, TASK_ENVIRONMENTS, register
+from spikecam_env.envs.registration import ALL_TASKS, ENVIRONMENTS, register
 from spikecam_env.errors import InputError, shown, unknown_name
 
 Env = gymnasium.Env[Any, Any]
@@ -116,7 +116,7 @@ def stacked(env: Env, stack: int) -> Env:
 def _known(task: Any) -> str:
     """The id as gymnasium has it."""
     register()
-    known = [*TASK_ENVIRONMENTS, *ENVIRONMENTS]
+    known = [*ALL_TASKS, *ENVIRONMENTS]
     for name in (task, f"spikecam_env/{task}"):
         if isinstance(task, str) and (name in known or name in gymnasium.registry):
             _check_kind(name)

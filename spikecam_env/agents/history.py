@@ -1,8 +1,8 @@
-"""The memory of an agent: the last pictures, and where the camera looked when it took them.
+"""The memory of an agent: the last pictures, and where its camera or its motors were when they were taken.
 
-Pictures (N, L C, H, W) are those of `lags` steps ago, the newest first.  The state (N, S) is the gaze's motion in the
-last step and since each lag, and the picture's age.  An episode begins as if a camera at rest had always seen its first
-picture.
+Pictures (N, L C, H, W) are those of `lags` steps ago, the newest first.  The state (N, S) of a camera that turns is the
+gaze's motion in the last step and since each lag, and the picture's age.  With encoders (`inner`) it is their numbers,
+their changes since each lag, and the age.  An episode begins as if all had been at rest before its first picture.
 """
 
 from __future__ import annotations
@@ -34,26 +34,28 @@ class History:
     def __init__(self, lags: Sequence[int], pool: int = 1) -> None:
         self.lags, self.pool = tuple(lags), pool
         self._pictures: list[NDArray[np.uint8]] = []
-        self._gazes: list[NDArray[np.float32]] = []
+        self._places: list[NDArray[np.float32]] = []
 
     def push(self, observation: dict[str, NDArray[Any]], fresh: NDArray[np.bool_]) -> PictureHistory:
         """Remember the next observations.
 
         Args:
-            observation: (N, ...), with `obs_state`.
+            observation: (N, ...), with `obs_state`; with `obs_inner` in place of the gaze.
             fresh: (N,), which are the first of an episode.
         """
         picture = pooled(observation["picture"].view(np.uint8), self.pool)
-        gaze = observation["gaze"].astype(np.float32)
+        has_gaze = "gaze" in observation
+        place = observation["gaze" if has_gaze else "inner"].astype(np.float32)
         length = self.lags[-1] + 2
         if not self._pictures:
             fresh = np.ones(len(picture), bool)
-            self._pictures, self._gazes = [picture] * length, [gaze] * length
+            self._pictures, self._places = [picture] * length, [place] * length
         again, moved = fresh[:, None, None, None], fresh[:, None]
         self._pictures = [picture, *(np.where(again, picture, old) for old in self._pictures[: length - 1])]
-        self._gazes = [gaze, *(np.where(moved, gaze, old) for old in self._gazes[: length - 1])]
-        motion = [gaze - self._gazes[lag] for lag in (1, *self.lags[1:])]
-        state = np.concatenate([*motion, observation["age"].astype(np.float32)], axis=1)
+        self._places = [place, *(np.where(moved, place, old) for old in self._places[: length - 1])]
+        motion = [place - self._places[lag] for lag in ((1, *self.lags[1:]) if has_gaze else self.lags[1:])]
+        known = motion if has_gaze else [place, *motion]
+        state = np.concatenate([*known, observation["age"].astype(np.float32)], axis=1)
         return PictureHistory(np.concatenate([self._pictures[lag] for lag in self.lags], axis=1), state)
 
 

@@ -12,10 +12,11 @@ from numpy.typing import ArrayLike, NDArray
 
 from spikecam_env.envs.evaluation import Evaluation
 from spikecam_env.envs.judged import JudgedEnv
+from spikecam_env.envs.registration import MUJOCO_NAMES
 from spikecam_env.envs.score import BASELINES, Policy, ends, play
 from spikecam_env.errors import InputError, shown
 
-EPISODES = {"Catch": 100, "Saccade": 50, "ReadSpin": 50}
+EPISODES = {"Catch": 100, "Saccade": 50, "ReadSpin": 50} | dict.fromkeys(MUJOCO_NAMES, 50)
 """Of the test split, those of the first seeds; others 10, which are long: each has 500 steps."""
 
 
@@ -44,8 +45,7 @@ def policy_of(policy: Any) -> tuple[Policy, dict[str, Any]]:
     if isinstance(policy, type):
         raise InputError(f"policy is the class {policy.__name__}; give an instance of it")
     if hasattr(policy, "begin") and hasattr(policy, "act"):
-        obs = getattr(policy, "obs", None)
-        return acting(policy), {} if obs is None else {"obs": obs, "obs_state": True}
+        return acting(policy), dict(getattr(policy, "sees", {}))
     if hasattr(policy, "predict"):
         return _predicting(policy), {}
     if callable(policy):
@@ -90,7 +90,15 @@ def judged(
     spec = env.spec
     task = type(env.unwrapped).__name__ if spec is None else spec.id.removeprefix("spikecam_env/")
     nothing, best = ends(env, seeds)
-    return Evaluation.of(task, played.performances, nothing, best, success=played.success, returns=played.returns)
+    return Evaluation.of(
+        task,
+        played.performances,
+        nothing,
+        best,
+        success=played.success,
+        returns=played.returns,
+        camera_bits_s=played.camera_bits_s,
+    )
 
 
 def score_of(actor: Actor, env: gymnasium.Env[Any, Any], episodes: int) -> float:

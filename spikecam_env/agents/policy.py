@@ -50,6 +50,19 @@ class PolicyRecipe(Declared):
     answers: Annotated[int, Field(ge=0, le=16)] = 0
     """Answers that an action can give: its last numbers, after the number that says one.  0 where the task asks
     nothing."""
+    sensed: Annotated[int, Field(ge=0, le=64)] = 0
+    """Numbers that encoders measure, of an environment with `obs_inner`; 0 where the gaze is observed."""
+
+    @property
+    def states(self) -> int:
+        """Numbers of the state, as of `History`.
+
+        Example:
+            >>> recipe = PolicyRecipe(channels=1, shape=(64, 64), high=255, lags=(0, 2), actions=2)
+            >>> recipe.states, recipe.model_copy(update={"sensed": 4}).states
+            (5, 9)
+        """
+        return (self.sensed or 2) * len(self.lags) + 1
 
     def network(self) -> Policy:
         """A network with random weights."""
@@ -67,7 +80,7 @@ class Policy(nn.Module):
     def __init__(self, recipe: PolicyRecipe) -> None:
         super().__init__()
         self.recipe, width, maps = recipe, recipe.width, recipe.maps
-        states = 2 * len(recipe.lags) + 1
+        states = recipe.states
         self.eye = nn.Sequential(
             nn.Conv2d(len(recipe.lags) * recipe.channels, width, 5, stride=2, padding=2),
             nn.ReLU(),

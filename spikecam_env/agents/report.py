@@ -12,8 +12,8 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from spikecam_env.agents.playing import Actor
 from spikecam_env.agents.study import Result
+from spikecam_env.envs.score import Policy, judged_env
 from spikecam_env.whole import whole_file
 
 COLUMNS = 3
@@ -58,25 +58,25 @@ def _draw_lines(axes: Axes, results: Sequence[Result], sights: Sequence[str]) ->
         axes.legend(frameon=False, loc="lower right")
 
 
-def pictures(actor: Actor, env: gymnasium.Env[Any, Any], seed: int) -> Iterator[NDArray[np.uint8]]:
-    """Pictures (rows, columns, 3) of an episode, one a step, ENLARGED, the middle marked; `env` renders rgb_array."""
+def pictures(policy: Policy, env: gymnasium.Env[Any, Any], seed: int) -> Iterator[NDArray[np.uint8]]:
+    """Pictures (rows, columns, 3) of an episode, one a step, enlarged, the middle marked; `env` renders rgb_array."""
     observation, _ = env.reset(seed=seed)
-    actor.begin()
-    over = False
+    inner, over = judged_env(env), False
     while not over:
         yield _marked(env.render())
-        observation, _, terminated, truncated, _ = env.step(actor.act(observation))
+        observation, _, terminated, truncated, _ = env.step(np.asarray(policy(observation, inner), np.float32))
         over = terminated or truncated
     yield _marked(env.render())
 
 
-ENLARGED = 6
-"""Side of a camera's pixel in the film [pixels]."""
+FILM_SIDE = 384
+"""Longer side of a film, to which smaller pictures are enlarged by a whole number [pixels]."""
 MARK = (255, 180, 0)
 
 
 def _marked(picture: Any) -> NDArray[np.uint8]:
-    large = np.asarray(picture, np.uint8).repeat(ENLARGED, axis=0).repeat(ENLARGED, axis=1)
+    factor = max(1, FILM_SIDE // max(np.shape(picture)[:2]))
+    large = np.asarray(picture, np.uint8).repeat(factor, axis=0).repeat(factor, axis=1)
     row, column = (size // 2 for size in large.shape[:2])
     large[row - 1 : row + 1, column - 12 : column + 12] = MARK
     large[row - 12 : row + 12, column - 1 : column + 1] = MARK

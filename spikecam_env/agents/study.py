@@ -1,14 +1,13 @@
-"""How well agents learn: every task, by the observation and by the light, over seeds.
+"""How well agents learn: every task, by the observation, the learner, the light and the level, over seeds.
 
-A cell is a task, a sight and a light.  Its result follows from the cell, the seed and the steps of training.  Results
-are lines of a record, so that a study goes on where it was stopped.
+A cell is a task, a sight, a learner, a light and a level.  Its result follows from the cell, the seed
+and the steps of training.  Results are lines of a record, so that a study goes on where it was stopped.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from contextlib import closing
-from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import Annotated, Any, TypeVar
@@ -18,12 +17,17 @@ import numpy as np
 from pydantic import Field
 from tqdm import tqdm
 
+from spikecam_env.agents import learner_sb3
 from spikecam_env.agents.agent import Agent, shipped
-from spikecam_env.agents.playing import Actor, episodes_along, episodes_of, score_of
+from spikecam_env.agents.controllers import CONTROLLERS, classical
+from spikecam_env.agents.evaluation import stacked
+from spikecam_env.agents.playing import episodes_along, episodes_of, judged, policy_of, score_of
 from spikecam_env.agents.ppo import PPO
-from spikecam_env.agents.tracker import Tracker
 from spikecam_env.agents.training import SIGHTS, Study, agents_along, learner, train_agent
 from spikecam_env.checked import checked_count, checked_number
+from spikecam_env.envs.mujoco_tasks import MUJOCO_TASKS
+from spikecam_env.envs.mujoco_tasks.task import checked_levels
+from spikecam_env.envs.score import BASELINES, Policy
 from spikecam_env.envs.tasks import TASKS
 from spikecam_env.errors import InputError, unknown_name
 from spikecam_env.pool import spread
@@ -36,8 +40,17 @@ T = TypeVar("T")
 R = TypeVar("R")
 
 SEEN = {"": "tfp", "-rate": "rate", "-clean": "clean"}
-READY = {f"{who}{ending}": sight for who in ("tracker", "shipped") for ending, sight in SEEN.items()}
-"""Players that learn nothing -> observation: the classical tracker, and the shipped agent, trained on `tfp`."""
+CLASSICAL = ("classical", "tracker")
+"""Names of the task's classical player; the second is the older one."""
+READY = {f"{who}{ending}": sight for who in (*CLASSICAL, "shipped") for ending, sight in SEEN.items()}
+READY |= dict.fromkeys(BASELINES, "tfp")
+"""Players that learn nothing -> observation: the classical player, the shipped agent, trained on `tfp`, and baselines,
+which look at no picture."""
+LEARNERS = ("ppo", "sb3")
+"""Our learner (`agents.ppo`), and that of stable-baselines3 with its defaults for pictures (`agents.learner_sb3`)."""
+
+
+Level = Annotated[int, Field(ge=1, le=5)]
 
 
 class StudyRun(Declared):
@@ -51,8 +64,14 @@ class StudyRun(Declared):
     """Mean interval of a pixel in the test episodes [frames]; None is the task's own light."""
     trained: Annotated[tuple[Positive, Positive], Field(strict=False)] | None = None
     """Shortest and longest interval in training [frames]; None is that of the test."""
+    level: Level | None = None
+    """Of a MuJoCo task in the test episodes; None is the middle one."""
+    trained_levels: Annotated[tuple[Level, Level], Field(strict=False)] | None = None
+    """Lowest and highest level in training; None is that of the test."""
     shape: Annotated[tuple[Side, Side], Field(strict=False)] | None = None
     """(rows, columns) of the camera; None is the id's."""
+    learner: Name = LEARNERS[0]
+    """One of LEARNERS."""
     imitate: bool = False
     """Whether the oracle is imitated (`agents.ppo`)."""
     seed: Seed = 0
@@ -69,30 +88,42 @@ class StudyRun(Declared):
     @property
     def played(self) -> Study:
         """The problem of the test episodes."""
-        return self._under(self._light)
+        return self._under(self._light, self._levels)
 
     @property
     def learned(self) -> Study:
         """The problem of the learner."""
-        return self._under(self.trained or self._light)
+        return self._under(self.trained or self._light, self.trained_levels or self._levels)
 
     @property
     def folder(self) -> str:
         """Where its training is kept; cases that are played alone differently have it in common."""
         marks = [self.task, *(f"{size}" for size in self.shape or ())]
         marks += [f"{interval:g}" for interval in dict.fromkeys(self.trained or self._light or ())]
-        marks += [self.sight, *["imitating"] * self.imitate, *[f"{self.steps}steps"] * (self.steps > 0)]
+        if levels := self.trained_levels or self._levels:
+            marks += [f"level{levels[0]}to{levels[1]}"]
+        marks += [self.sight, *[self.learner] * (self.learner != LEARNERS[0]), *["imitating"] * self.imitate]
+        marks += [f"{self.steps}steps"] * (self.steps > 0)
         return "-".join([*marks, str(self.seed)])
 
     @property
     def _light(self) -> tuple[float, float] | None:
         return None if self.interval is None else (self.interval, self.interval)
 
-    def _under(self, light: tuple[float, float] | None) -> Study:
-        study = Study(self.task, READY.get(self.sight, self.sight))
-        task = {} if light is None else {"task": TASKS[study.name](mean_interval=light)}
-        shape = {} if self.shape is None else {"shape": self.shape}
-        return replace(study, options=task | shape)
+    @property
+    def _levels(self) -> tuple[int, int] | None:
+        return None if self.level is None else (self.level, self.level)
+
+    def _under(self, light: tuple[float, float] | None, levels: tuple[int, int] | None) -> Study:
+        options: dict[str, Any] = {} if self.shape is None else {"shape": self.shape}
+        if levels is not None:
+            options["level"] = levels
+        name = Study(self.task).name
+        if light is not None and name in MUJOCO_TASKS:
+            options["mean_interval"] = light[0]
+        elif light is not None:
+            options["task"] = TASKS[name](mean_interval=light)
+        return Study(self.task, READY.get(self.sight, self.sight), options, state=self.learner != "sb3")
 
 
 class Result(Declared):
@@ -101,6 +132,10 @@ class Result(Declared):
     case: StudyRun
     score: Annotated[float, Field(ge=-100, le=100)]
     """Score on the test split."""
+    success: Annotated[float, Field(ge=0, le=1)] | None = None
+    """Share of test episodes that end in success; None in older records."""
+    camera_bits_s: Annotated[float, Field(ge=0)] | None = None
+    """What the camera sent in the test episodes [bits/s]; None in older records."""
     cpu_s: Annotated[float, Field(ge=0)] = 0.0
     """Processor time of training [s]."""
     curve: Annotated[tuple[dict[Name, float], ...], Field(strict=False)] = ()
@@ -122,10 +157,13 @@ def cases(
     episodes: int | None = None,
     *,
     trained: tuple[float, float] | None = None,
+    levels: Sequence[int] = (),
+    trained_levels: tuple[int, int] | None = None,
     shape: tuple[int, int] | None = None,
+    learners: Sequence[str] = LEARNERS[:1],
     imitate: bool = False,
 ) -> list[StudyRun]:
-    """Every cell with every seed, all cells of the first seed first.
+    """Every cell with every seed, all cells of the first seed first; who learns nothing plays once.
 
     Args:
         tasks: ids.
@@ -135,47 +173,66 @@ def cases(
         steps: lengths of training, each a cell; none is that of `PPO`.
         episodes: of the test split; None is `playing.episodes_of` the task.
         trained: shortest and longest interval in training [frames]; None is the interval of the test.
+        levels: at which each task is played, of MuJoCo tasks; none is the middle one.
+        trained_levels: lowest and highest level in training; None is the level of the test.
         shape: (rows, columns) of the camera; None is the id's.
-        imitate: learn from the oracle (`agents.ppo`).
+        learners: names of LEARNERS, each with every sight.
+        imitate: our learner learns from the oracle (`agents.ppo`).
 
     Raises:
-        InputError: for an unknown task, sight or shipped agent, and for steps and intervals out of range.
+        InputError: for an unknown task, sight, learner or shipped agent, for steps, intervals and levels out of range,
+            and for levels of tasks that have none.
     """
-    for task in tasks:
-        Study(task)  # refuses unknown names
     for sight in sights:
         if sight not in (*SIGHTS, *READY):
             raise unknown_name("observation", sight, (*SIGHTS, *READY))
+    for task in tasks:
+        _check_task(Study(task), sights, bool(levels or trained_levels), trained)
+    for each in (*levels, *([trained_levels] if trained_levels else [])):
+        checked_levels(each)
+    for name in learners:
+        if name not in LEARNERS:
+            raise unknown_name("learner", name, LEARNERS)
+    if "sb3" in learners:
+        learner_sb3.check_sb3()
     for length in steps:
         checked_count(length, "steps")
     for interval in (*intervals, *(trained or ())):
         checked_number(interval, "interval", 1.0, unit="frames")
     if trained is not None and trained[0] > trained[1]:
         raise InputError(f"intervals of training are {trained}; give the shortest, then the longest")
-    runs = [
-        StudyRun(task=task, sight=sight, interval=interval, shape=shape, seed=seed, episodes=episodes)
-        if sight in READY
-        else StudyRun(
-            task=task,
-            sight=sight,
-            interval=interval,
-            trained=trained,
-            shape=shape,
-            imitate=imitate,
-            seed=seed,
-            steps=length,
-            episodes=episodes,
-        )
+    played = [
+        StudyRun(task=task, sight=sight, interval=interval, level=level, shape=shape, seed=seed, episodes=episodes)
         for seed in seeds
         for task in tasks
         for sight in sights
-        for length in ((0,) if sight in READY else steps or (PPO.steps,))
         for interval in (intervals or (None,))
+        for level in (levels or (None,))
     ]
-    for case in runs:
-        if case.sight.startswith("shipped") and case.task not in shipped():
-            raise unknown_name("agent", case.task, shipped())
+    runs: list[StudyRun] = []
+    for case in played:
+        if case.sight in READY:
+            runs += [case] * (case.seed == played[0].seed)
+            continue
+        for who in learners:
+            own: dict[str, Any] = {"trained": trained, "trained_levels": trained_levels, "learner": who}
+            own |= {"imitate": imitate and who == LEARNERS[0]}
+            runs += [case.model_copy(update={**own, "steps": length}) for length in steps or (PPO.steps,)]
     return runs
+
+
+def _check_task(study: Study, sights: Sequence[str], has_levels: bool, trained: tuple[float, float] | None) -> None:
+    """Raise InputError for a task that is not to be had as asked for."""
+    is_mujoco = study.name in MUJOCO_TASKS
+    if has_levels and not is_mujoco:
+        raise InputError(f"{study.task} has no levels, MuJoCo tasks have: {', '.join(MUJOCO_TASKS)}; leave levels out")
+    if trained is not None and is_mujoco:
+        raise InputError(f"{study.task} is learned at one mean interval; leave --trained out")
+    players = {sight.partition("-")[0] for sight in sights}
+    if "shipped" in players and study.task not in shipped():
+        raise unknown_name("agent", study.task, shipped())
+    if players & {*CLASSICAL} and study.name not in CONTROLLERS:
+        raise unknown_name("task of a classical controller", study.name, CONTROLLERS)
 
 
 def measure(cases: Sequence[StudyRun], out: Path, points: int = POINTS) -> list[Result]:
@@ -194,6 +251,8 @@ def _curve(case: StudyRun, out: Path, points: int) -> tuple[dict[str, float], ..
     """The curve of its training, which is done first or completed."""
     if case.sight in READY:
         return ()
+    if case.learner == "sb3":
+        return learner_sb3.train_sb3(case.learned, out / case.folder, case.steps, case.seed)
     ppo = learner(case.steps, imitate=case.imitate)
     return tuple(train_agent(case.learned, out / case.folder, ppo, case.seed, points=points).training["curve"])
 
@@ -201,28 +260,68 @@ def _curve(case: StudyRun, out: Path, points: int) -> tuple[dict[str, float], ..
 def _played(case: StudyRun, curve: tuple[dict[str, float], ...], out: Path) -> Result:
     episodes = case.episodes or episodes_of(case.task)
     with (
-        closing(case.played.make(split="test")) as env,
+        closing(environment_of(case, split="test")) as env,
         torch_settings(threads=1),  # more pay for no network here, and where others work too they wait for each other
     ):
-        score = score_of(actor_of(case, out, env), env, episodes)
+        reached = judged(player_of(case, out, env), env, range(episodes))
         along = _along(case, env, episodes_along(episodes), out)
-    return Result(case=case, score=score, cpu_s=curve[-1]["cpu_s"] if curve else 0.0, curve=curve, along=along)
+    return Result(
+        case=case,
+        score=reached.score,
+        success=reached.success,
+        camera_bits_s=reached.camera_bits_s,
+        cpu_s=curve[-1]["cpu_s"] if curve else 0.0,
+        curve=curve,
+        along=along,
+    )
 
 
 def _along(case: StudyRun, env: gymnasium.Env[Any, Any], episodes: int, out: Path) -> tuple[dict[str, float], ...]:
     """Of a case whose agent was trained: the score of the agents on the way."""
-    if case.sight in READY:
+    if case.sight in READY or case.learner != LEARNERS[0]:
         return ()
     agents = agents_along(out / case.folder)
     return tuple({"steps": steps, "score": score_of(Agent.load(path), env, episodes)} for steps, path in agents.items())
 
 
-def actor_of(case: StudyRun, out: Path, env: gymnasium.Env[Any, Any]) -> Actor:
-    """The player of a case: the tracker, the shipped agent, or the one whose training is kept in `out`."""
-    inner: Any = env.unwrapped
-    if case.sight.startswith("tracker"):
-        return Tracker(inner)
-    return Agent.load(case.task if case.sight in READY else out / case.folder / "agent.pt")
+def environment_of(case: StudyRun, **options: Any) -> gymnasium.Env[Any, Any]:
+    """The environment of a case's test, as its player sees it.
+
+    Args:
+        case: of the study.
+        options: further keywords of the environment, e.g. split="test".
+
+    Example:
+        >>> env = environment_of(StudyRun(task="Catch-v1", sight="tfp", learner="sb3"), split="test")
+        >>> env.observation_space.shape
+        (4, 64, 64)
+    """
+    return stacked(case.played.make(**options), learner_sb3.STACK if case.learner == "sb3" else 1)
+
+
+def player_of(case: StudyRun, out: Path, env: gymnasium.Env[Any, Any]) -> Policy:
+    """The player of a case: a baseline, the classical one, the shipped agent, or the one whose training is in `out`.
+
+    Args:
+        case: of the study.
+        out: folder of the study.
+        env: of `environment_of` the case.
+
+    Example:
+        >>> case = StudyRun(task="Catch-v1", sight="oracle")
+        >>> env = environment_of(case, split="test")
+        >>> observation, info = env.reset(seed=0)
+        >>> player_of(case, Path(), env)(observation, env.unwrapped).shape
+        (1,)
+    """
+    who, folder = case.sight.partition("-")[0], out / case.folder
+    if who in BASELINES:
+        return BASELINES[who]
+    if who in CLASSICAL:
+        return policy_of(classical(env.unwrapped))[0]
+    if case.learner == "sb3":
+        return policy_of(learner_sb3.load_sb3(folder))[0]
+    return policy_of(Agent.load(case.task if case.sight in READY else folder / "agent.pt"))[0]
 
 
 def study(
@@ -277,19 +376,42 @@ def summary(results: Sequence[Result]) -> list[dict[str, Any]]:
     cells: dict[StudyRun, list[Result]] = {}
     for result in results:
         cells.setdefault(result.case.cell, []).append(result)
-    return [_row(cell, of_seeds) for cell, of_seeds in cells.items()]
+    rows = [_row(cell, of_seeds) for cell, of_seeds in cells.items()]
+    empty = {name for name in WHERE_KNOWN if all(row[name] is None for row in rows)}
+    return [{name: value for name, value in row.items() if name not in empty} for row in rows]
+
+
+WHERE_KNOWN = ("learner", "level", "success", "camera [Mbit/s]", "learned at [levels]")
+"""Columns that are left out where no row has them."""
+
+
+def mean_known(values: Iterable[float | None]) -> float | None:
+    """The mean of those that are known, None where none is.
+
+    Example:
+        >>> mean_known([1.0, None, 2.0]), mean_known([None])
+        (1.5, None)
+    """
+    known = [value for value in values if value is not None]
+    return float(np.mean(known)) if known else None
 
 
 def _row(cell: StudyRun, of_seeds: list[Result]) -> dict[str, Any]:
     scores = np.array([result.score for result in of_seeds])
+    bits = mean_known(result.camera_bits_s for result in of_seeds)
     return {
         "task": cell.task,
         "sees": cell.sight,
+        "learner": None if cell.learner == LEARNERS[0] else cell.learner,
         "interval [frames]": cell.interval,
+        "level": cell.level,
         "score": float(scores.mean()),
         "sd": float(scores.std(ddof=1)) if len(scores) > 1 else None,
         "seeds": len(scores),
+        "success": mean_known(result.success for result in of_seeds),
+        "camera [Mbit/s]": None if bits is None else bits / 1e6,
         "steps": cell.steps,
         "cpu [min]": float(np.mean([result.cpu_s for result in of_seeds]) / 60),
         "learned at [frames]": cell.trained and "{:g} to {:g}".format(*cell.trained),
+        "learned at [levels]": cell.trained_levels and "{} to {}".format(*cell.trained_levels),
     }

@@ -15,15 +15,17 @@ from pathlib import Path
 from typing import Any
 
 import gymnasium
-from gymnasium.spaces import Box, Dict
+from gymnasium.spaces import Box, Dict, flatdim
 from gymnasium.vector import VectorEnv
 
 from denoiser.training.resumable_run import Run
-from spikecam_env.agents.agent import ENDING, Agent
+from spikecam_env.agents.agent import ENDING, Agent, state_keywords
 from spikecam_env.agents.policy import PolicyRecipe
 from spikecam_env.agents.ppo import PPO, train
-from spikecam_env.envs.registration import TASK_ENVIRONMENTS, register
-from spikecam_env.envs.tasks import TASKS
+from spikecam_env.envs.mujoco_tasks import MUJOCO_TASKS, MujocoTask
+from spikecam_env.envs.observations import OBSERVATIONS
+from spikecam_env.envs.registration import ALL_TASKS, register
+from spikecam_env.envs.tasks import TASKS, Task
 from spikecam_env.errors import unknown_name
 from spikecam_env.run_folder import run_folder
 from spikecam_env.torch_settings import torch_settings
@@ -45,10 +47,12 @@ class Study:
     """A name of SIGHTS."""
     options: dict[str, Any] = field(default_factory=dict)
     """Further keywords of the environments."""
+    state: bool = True
+    """Whether more than the picture is observed (`agent.state_keywords`)."""
 
     def __post_init__(self) -> None:
-        if f"spikecam_env/{self.task}" not in TASK_ENVIRONMENTS:
-            raise unknown_name("task", self.task, (name.split("/")[1] for name in TASK_ENVIRONMENTS))
+        if f"spikecam_env/{self.task}" not in ALL_TASKS:
+            raise unknown_name("task", self.task, (name.split("/")[1] for name in ALL_TASKS))
         if self.sight not in SIGHTS:
             raise unknown_name("observation", self.sight, SIGHTS)
 
@@ -58,9 +62,14 @@ class Study:
         return self.task.split("-")[0]
 
     @property
+    def kind(self) -> type[Task] | type[MujocoTask]:
+        """Class of the task."""
+        return TASKS[self.name] if self.name in TASKS else MUJOCO_TASKS[self.name]
+
+    @property
     def keywords(self) -> dict[str, Any]:
         """Keywords of an environment."""
-        return {"obs_state": True, **SIGHTS[self.sight], **self.options}
+        return {**(state_keywords(self.task) if self.state else {}), **SIGHTS[self.sight], **self.options}
 
     def make(self, **options: Any) -> gymnasium.Env[Any, Any]:
         """One environment."""
@@ -68,24 +77,26 @@ class Study:
         return gymnasium.make(f"spikecam_env/{self.task}", **{**self.keywords, **options})
 
     def make_vec(self, count: int) -> VectorEnv[Any, Any, Any]:
-        """A vector of so many environments."""
+        """A vector of so many environments: the native one, or Gymnasium's where the task has none."""
         register()
-        name, mode = f"spikecam_env/{self.task}", "vector_entry_point"
+        name = f"spikecam_env/{self.task}"
+        mode = "sync" if gymnasium.spec(name).vector_entry_point is None else "vector_entry_point"
         return gymnasium.make_vec(name, num_envs=count, vectorization_mode=mode, **self.keywords)
 
 
 SIGHTS: dict[str, dict[str, Any]] = {
-    **{obs: {"obs": obs} for obs in ("tfp", "root_tfp", "tfi", "spikes", "rate", "dim_rate", "root_rate")},
-    **{obs: {"obs": obs} for obs in ("frame30", "frame1000")},
+    **{obs: {"obs": obs} for obs in OBSERVATIONS if obs not in ("multibinary", "packed", "isi")},
     "clean": {"obs": "tfp", "model": "ideal"},
     "root_clean": {"obs": "root_tfp", "model": "ideal"},
 }
-"""Observations by name: of the noisy camera, or `clean`, the rates of a camera without noise."""
+"""Observations by name: every one that is a picture of bytes, of the noisy camera or another in its place; or `clean`,
+the rates of a camera without noise."""
 
 LAGS = {"Catch": (0, 2, 5), "Saccade": (0, 3), "ReadSpin": (0, 1, 2, 4), "LowLight": (0, 1, 2, 3, 4)}
+LAGS |= dict.fromkeys(MUJOCO_TASKS, (0, 2, 5, 10))
 """Steps ago of the pictures that a task is learned from; others from (0, 4).  In the dark every spike counts."""
-POOL = {"Saccade": 1, "ReadDigit": 1}
-"""Pixels squared that are averaged; others 2.  Spokes and strokes are finer than two pixels."""
+POOL = {"Saccade": 1, "ReadDigit": 1} | dict.fromkeys(MUJOCO_TASKS, 1)
+"""Pixels squared that are averaged; others 2.  Spokes, strokes and far balls are finer than two pixels."""
 
 
 def recipe_of(study: Study, envs: VectorEnv[Any, Any, Any]) -> PolicyRecipe:
@@ -98,7 +109,7 @@ def recipe_of(study: Study, envs: VectorEnv[Any, Any, Any]) -> PolicyRecipe:
         (64, 64)
         >>> cameras.close()
     """
-    name, task = study.name, TASKS[study.name]
+    name = study.name
     spaces, action = envs.single_observation_space, envs.single_action_space
     assert isinstance(spaces, Dict) and isinstance(action, Box)
     picture = spaces["picture"]
@@ -111,7 +122,8 @@ def recipe_of(study: Study, envs: VectorEnv[Any, Any, Any]) -> PolicyRecipe:
         lags=LAGS.get(name, (0, 4)),
         actions=action.shape[0],
         pool=POOL.get(name, 2),
-        answers=task.answers,
+        answers=study.kind.answers,
+        sensed=flatdim(spaces["inner"]) if "inner" in spaces.spaces else 0,
     )
 
 

@@ -25,6 +25,7 @@ from tqdm import tqdm
 import spikecam_env.envs  # noqa: F401
 from scenes.flat.planes import painted_planes
 from spikecam_env.bench.learners import bench_learners
+from spikecam_env.envs.registration import MUJOCO_NAMES
 from spikecam_env.envs.spike_camera import SpikeCameraEnv, lights_of
 from spikecam_env.sensor import Keyframes, step_together
 from spikecam_env.threads import as_many
@@ -72,9 +73,12 @@ class Contestant:
 
 
 def bench_environments() -> dict[str, list[dict[str, Any]]]:
-    """Tables by title: `bench_vectors`, `bench_episodes` and, with stable-baselines3, `bench_learners`."""
+    """Tables by title: `bench_vectors`, `bench_episodes` and, with the extras, `bench_mujoco` and `bench_learners`."""
+    from spikecam_env.bench.mujoco_tasks import bench_mujoco  # which measures as this file does
+
     tables = {"one camera and many": bench_vectors(), "episodes of one camera": bench_episodes()}
-    return tables | {title: rows for title, rows in {"stable-baselines3": bench_learners()}.items() if rows}
+    optional = {"a task by MuJoCo": bench_mujoco(), "stable-baselines3": bench_learners()}
+    return tables | {title: rows for title, rows in optional.items() if rows}
 
 
 def bench_episodes(
@@ -139,14 +143,14 @@ def bench_vectors(
     for name, obs, count in tqdm(jobs, desc="bench", unit="group", leave=False):
         contestants = [single(name, obs), *(vector(name, obs, how, count) for how in MODES)]
         try:
-            rows += _group(name, obs, contestants, seconds, rounds, with_single=count == counts[0])
+            rows += measured(name, obs, contestants, seconds, rounds, with_single=count == counts[0])
         finally:
             for one in contestants:
                 one.close()
     return rows
 
 
-def _group(
+def measured(
     name: str, obs: str, contestants: Sequence[Contestant], seconds: float, rounds: int, with_single: bool
 ) -> list[dict[str, Any]]:
     """Rows of contestants measured in turn; the first is the single one, which other groups have too."""
@@ -229,9 +233,9 @@ def _clock(process: int) -> int:
     return clock.value if ask is not None and ask(process, ctypes.byref(clock)) == 0 else 0
 
 
-def single(name: str, obs: str) -> Contestant:
+def single(name: str, obs: str, options: dict[str, Any] = OPTIONS) -> Contestant:
     """One environment by itself."""
-    env = gymnasium.make(f"spikecam_env/{name}", **OPTIONS, obs=obs)
+    env = gymnasium.make(f"spikecam_env/{name}", **options, obs=obs)
     env.reset(seed=0)
     still = np.zeros(env.action_space.shape or (), np.float32)
 
@@ -240,13 +244,17 @@ def single(name: str, obs: str) -> Contestant:
         if terminated or truncated:
             env.reset()
 
-    return Contestant("single", 1, step, [env.unwrapped], env.close)  # type: ignore[list-item]
+    envs = [env.unwrapped] if isinstance(env.unwrapped, SpikeCameraEnv) else []
+    return Contestant("single", 1, step, envs, env.close)
 
 
-def vector(name: str, obs: str, how: str, count: int) -> Contestant:
+def vector(name: str, obs: str, how: str, count: int, options: dict[str, Any] = OPTIONS) -> Contestant:
     """As many in a vector: `how` is one of MODES."""
     mode = MODES[how]
-    env: Any = gymnasium.make_vec(f"spikecam_env/{name}", num_envs=count, vectorization_mode=mode, **OPTIONS, obs=obs)
+    options = {**options, "obs": obs}
+    if how == "async" and name.removesuffix("-v1") in MUJOCO_NAMES:  # OpenGL does not survive a fork
+        options["vector_kwargs"] = {"context": "spawn"}
+    env: Any = gymnasium.make_vec(f"spikecam_env/{name}", num_envs=count, vectorization_mode=mode, **options)
     env.reset(seed=0)
     still = np.zeros(env.action_space.shape, np.float32)
     envs = env.unwrapped.envs if how == "native" else []

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import MISSING, dataclass, fields, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import tyro
 
 from spikecam_env.cli.options import Size
+from spikecam_env.errors import unknown_name
 from spikecam_env.numbers import WholeRange, Workers
 
 if TYPE_CHECKING:
@@ -33,7 +34,8 @@ class Agents:
 
     out: Path
     """Folder for record.jsonl, a line a run; agents.txt, the table; curves.png; with --intervals, light.md and
-    light.png, scores over light; and every run's agent."""
+    light.png, scores over light; with --levels, levels.md and levels.png, successes over levels; and every run's
+    agent."""
     tasks: Annotated[tuple[str, ...], tyro.conf.arg(metavar="ID...")] = ("Track-v1", "Catch-v1", "Saccade-v1")
     """Ids, with or without `spikecam_env/`."""
     observations: Annotated[tuple[str, ...], tyro.conf.arg(metavar="NAME...")] = (
@@ -42,20 +44,27 @@ class Agents:
         "clean",
         "frame30",
         "frame1000",
-        "tracker",
+        "classical",
     )
     """Observations: tfp, tfi, spikes, rate (denoised), dim_rate (the same, brighter), clean (no noise), root_tfp,
-    root_rate and root_clean (on a root scale, for the dark), frame30, frame1000.  Without training: tracker (classical,
-    sees tfp), tracker-rate, tracker-clean; shipped (the task's shipped agent, trained on tfp, sees it), shipped-rate,
-    shipped-clean."""
+    root_rate and root_clean (on a root scale, for the dark), frame30, frame120,
+    frame1000, root_frame30 ..., events; see docs/observations.md.
+    Without training: classical (the task's classical player, sees tfp), classical-rate, classical-clean; shipped (the
+    task's shipped agent, trained on tfp, sees it), shipped-rate, shipped-clean; oracle, nothing and random."""
     intervals: tuple[float, ...] = ()
     """Mean intervals [frames] at which each task is played, each a row, and learned.  Default: the task's own light."""
     trained: tuple[float, float] | None = None
     """Shortest and longest mean interval [frames] at which tasks are learned, one agent for all --intervals."""
+    levels: tuple[int, ...] = ()
+    """Levels at which each MuJoCo task is played, each a row, and learned.  Default: the middle one."""
+    trained_levels: tuple[int, int] | None = None
+    """Lowest and highest level at which tasks are learned, one agent for all --levels."""
     size: Size | None = None
     """Rows and columns of the camera.  Default: those of the id."""
+    learners: Annotated[tuple[str, ...], tyro.conf.arg(metavar="NAME...")] = ("ppo",)
+    """Learners, each with every observation: ppo (ours); sb3 (PPO of stable-baselines3, its defaults for pictures)."""
     imitate: bool = False
-    """Learn to act like the oracle, instead of from rewards (as of `train-agent`)."""
+    """Our learner learns to act like the oracle, instead of from rewards (as of `train-agent`)."""
     seeds: Annotated[int, WholeRange(1, MOST_SEEDS)] = 5
     """Trainings of each task and observation, with different seeds."""
     first_seed: Annotated[int, WholeRange(0, 10**9)] = 0
@@ -63,7 +72,7 @@ class Agents:
     steps: tuple[int, ...] = ()
     """Training steps; several are trainings of their own, each a row.  Default: as many as the shipped agents had."""
     episodes: Annotated[int, WholeRange(1, MOST_EPISODES)] | None = None
-    """Test episodes that make up a score.  Default: 100 of Catch, 50 of Saccade, 10 of Track."""
+    """Test episodes that make up a score.  Default: 100 of Catch, 50 of Saccade and of MuJoCo tasks, 10 of Track."""
     points: Annotated[int, WholeRange(0, MOST_POINTS)] = 12
     """Agents on the way that are played too, for curves.png; 0 saves their time."""
     jobs: Workers = 1
@@ -71,11 +80,25 @@ class Agents:
     ray: Annotated[str | None, tyro.conf.arg(metavar="ADDRESS")] = None
     """Train on a Ray cluster: its address, or `local` for one of --jobs workers here."""
 
+    suite: Annotated[str | None, tyro.conf.arg(metavar="NAME")] = None
+    """A suite, v1, in place of tasks, observations, levels, learners, seeds, steps, episodes (docs/leaderboard.md)."""
+    entry: Annotated[str | None, tyro.conf.arg(metavar="NAME")] = None
+    """Write NAME.json too, an entry of the leaderboard (docs/leaderboard.md)."""
     films: bool = False
     """Write a film of the first test episode of each, TASK-NAME-SEED.mp4, of the first seed."""
 
     def run(self) -> None:
-        from spikecam_env.agents.over_light import draw_over_light
+        (self if self.suite is None else self._of_suite(self.suite))._run()
+
+    def _of_suite(self, name: str) -> Agents:
+        """The same with the options of a suite."""
+        from spikecam_env.agents.suite import SUITES
+
+        if name not in SUITES:
+            raise unknown_name("suite", name, SUITES)
+        return replace(self, suite=None, **vars(SUITES[name]))
+
+    def _run(self) -> None:
         from spikecam_env.agents.report import draw_curves
         from spikecam_env.agents.study import cases, study
 
@@ -89,7 +112,10 @@ class Agents:
             self.steps,
             self.episodes,
             trained=self.trained,
+            levels=self.levels,
+            trained_levels=self.trained_levels,
             shape=self.size,
+            learners=self.learners,
             imitate=self.imitate,
         )
         results = study(wanted, self.out, points=self.points, jobs=self.jobs, ray=self.ray)
@@ -97,16 +123,15 @@ class Agents:
         if self.points:
             draw_curves(results, self.out / "curves.png")
             written.append("curves.png")
-        if self.intervals:
-            draw_over_light(results, self.out / "light.png")
-            written.append("light.png")
+        if self.entry is not None:
+            written.append(self._write_entry(results, self.entry))
         if self.films:
             self._film([result.case for result in results if result.case.seed == self.first_seed])
         print(f"wrote {', '.join(written)} in {self.out}")
 
     def _tables(self, results: list[Result]) -> list[str]:
-        """Print and write the tables, and give the names of their files."""
-        from spikecam_env.agents.over_light import light_rows
+        """Print and write the tables, with their pictures, and give the names of their files."""
+        from spikecam_env.agents.over import LEVELS, LIGHT, draw_over, rows_over
         from spikecam_env.agents.study import summary
         from spikecam_env.cli.table import markdown, table
         from spikecam_env.whole import write_text_whole
@@ -114,23 +139,45 @@ class Agents:
         rows = summary(results)
         write_text_whole(self.out / "agents.txt", table(rows) + "\n")
         print(table(rows))
-        if not self.intervals:
-            return ["agents.txt"]
-        over_light = light_rows(results)
-        write_text_whole(self.out / "light.md", markdown(over_light) + "\n")
-        print("\n" + table(over_light))
-        return ["agents.txt", "light.md"]
+        written = ["agents.txt"]
+        for name, over, values in (("light", LIGHT, self.intervals), ("levels", LEVELS, self.levels)):
+            if values:
+                rows = rows_over(results, over)
+                write_text_whole(self.out / f"{name}.md", markdown(rows) + "\n")
+                print("\n" + table(rows))
+                draw_over(results, over, self.out / f"{name}.png")
+                written += [f"{name}.md", f"{name}.png"]
+        return written
+
+    def _write_entry(self, results: list[Result], name: str) -> str:
+        """Write the entry of the leaderboard, and give the name of its file."""
+        from spikecam_env.agents.leaderboard import entry_of
+        from spikecam_env.whole import write_text_whole
+
+        own = entry_of(results, name, self._command())
+        write_text_whole(self.out / f"{name}.json", own.model_dump_json(indent=1) + "\n")
+        return f"{name}.json"
+
+    def _command(self) -> str:
+        """The command line that gives these options."""
+        words = ["spikecam evaluate agents"]
+        for option in fields(self):
+            value = getattr(self, option.name)
+            if option.default is MISSING or value != option.default:
+                words.append("--" + option.name.replace("_", "-"))
+                words += [str(one) for one in (value if isinstance(value, tuple) else [value]) if value is not True]
+        return " ".join(words)
 
     def _film(self, played: list[StudyRun]) -> None:
         from spikecam_env.agents.report import pictures
-        from spikecam_env.agents.study import actor_of
+        from spikecam_env.agents.study import environment_of, player_of
         from spikecam_env.cli.screen.film import write_film
 
         for case in played:
-            env = case.played.make(split="test", render_mode="rgb_array")
+            env = environment_of(case, split="test", render_mode="rgb_array")
             try:
                 write_film(
-                    self.out / f"{case.folder}.mp4", pictures(actor_of(case, self.out, env), env, seed=0), FILM_FPS
+                    self.out / f"{case.folder}.mp4", pictures(player_of(case, self.out, env), env, seed=0), FILM_FPS
                 )
             finally:
                 env.close()

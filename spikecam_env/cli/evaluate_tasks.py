@@ -45,11 +45,11 @@ class Tasks:
     def run(self) -> None:
         from spikecam_env.cli.files import write_json
         from spikecam_env.cli.table import table
-        from spikecam_env.envs.registration import ENVIRONMENTS, SMALL_TASKS, TASK_ENVIRONMENTS
+        from spikecam_env.envs.registration import ALL_TASKS, ENVIRONMENTS, SMALL_TASKS
         from spikecam_env.envs.score import baselines
         from spikecam_env.whole import check_file
 
-        known = (*TASK_ENVIRONMENTS, *ENVIRONMENTS)
+        known = (*ALL_TASKS, *ENVIRONMENTS)
         asked = [name if "/" in name else f"spikecam_env/{name}" for name in self.tasks] or list(SMALL_TASKS)
         for name in asked:
             if name not in known:

@@ -70,14 +70,18 @@ class Play:
 
     def run(self) -> None:
         from spikecam_env.cli.files import check_place
+        from spikecam_env.cli.live.episodes import full_name
         from spikecam_env.cli.live.filming import watch
         from spikecam_env.cli.live.players import Player, player, steering
         from spikecam_env.cli.screen.window import has_display
+        from spikecam_env.envs.registration import MUJOCO_ENVIRONMENTS
 
         film = self.film
         if film is None and not has_display():
             film = Path(f"{self.id.rpartition('/')[2]}.mp4")
         who = (KEYBOARD if film is None else "oracle") if self.policy is None else self.policy
+        if who == KEYBOARD and full_name(self.id) in MUJOCO_ENVIRONMENTS:
+            raise InputError(f"{self.id} has no camera that keys could turn; watch a policy: --policy oracle")
         if film is not None and who == KEYBOARD:
             raise InputError("--policy keyboard needs a window: run it where there is a display, without --film")
         check_place("film", film, ".mp4")

@@ -27,13 +27,16 @@ class TrainAgent:
     """Folder of the run: agent.pt, curve.json, and last.pt to go on from."""
     obs: str = "tfp"
     """Observation: tfp, tfi, spikes, rate (denoised), dim_rate (the same, brighter), clean (no noise), root_tfp,
-    root_rate or root_clean (on a root scale, for the dark), frame30 or frame1000."""
+    root_rate or root_clean (on a root scale, for the dark), frame30, frame120, frame1000,
+    root_frame30 ... or events (docs/observations.md)."""
     steps: Count | None = None
     """Steps of all environments together.  Default: as many as the shipped agents had."""
     seed: Seed = 0
     """Seed of network, actions, episodes and cameras."""
     environments: Annotated[int, WholeRange(1, MOST_ENVIRONMENTS)] = 16
     """Number of cameras stepped together."""
+    levels: tuple[int, int] | None = None
+    """Lowest and highest level of a MuJoCo task, of which every episode draws one.  Default: the middle one."""
     plain: bool = False
     """Train by PPO from rewards alone, without the auxiliary loss that asks for the target's place."""
 
@@ -44,7 +47,8 @@ class TrainAgent:
         from spikecam_env.agents.training import Study, learner, train_agent
         from spikecam_env.cli.table import table
 
-        study = Study(self.task.removeprefix("spikecam_env/"), self.obs)
+        options = {} if self.levels is None else {"level": self.levels}
+        study = Study(self.task.removeprefix("spikecam_env/"), self.obs, options)
         ppo = learner(self.steps, imitate=self.imitate, plain=self.plain)
         agent = train_agent(study, self.out, ppo, self.seed, self.environments)
         print(table(agent.training["curve"][-10:]))

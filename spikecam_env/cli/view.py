@@ -93,9 +93,9 @@ class ViewCommand:
         from spikecam_env.cli.live.episodes import environment, full_name
         from spikecam_env.cli.live.players import player
         from spikecam_env.cli.live.streams import of_episode, of_recording
-        from spikecam_env.envs.registration import ENVIRONMENTS, TASK_ENVIRONMENTS
+        from spikecam_env.envs.registration import ALL_TASKS, ENVIRONMENTS
 
-        ids = (*ENVIRONMENTS, *TASK_ENVIRONMENTS)
+        ids = (*ENVIRONMENTS, *ALL_TASKS)
         if self.what in SCENES:
             yield self._scene()
         elif full_name(self.what) in ids:

@@ -63,6 +63,8 @@ class Evaluation:
     """Mean of the undiscounted sum of rewards."""
     performances: tuple[float, ...] = field(repr=False)
     """Performance in each episode."""
+    camera_bits_s: float = float("nan")
+    """What the camera sent [bits/s]; NaN where it is not known."""
 
     @classmethod
     def of(
@@ -74,6 +76,7 @@ class Evaluation:
         *,
         success: float,
         returns: float,
+        camera_bits_s: float = float("nan"),
     ) -> Evaluation:
         """The evaluation of episodes, from the performances of policy, nothing and oracle in each."""
         reached, still, best = (np.asarray(one, float) for one in (performances, nothing, oracle))
@@ -82,7 +85,7 @@ class Evaluation:
         interval = _wilson if method == "Wilson" else _bootstrap
         low, high = interval(reached, still, best)
         of_policy, each = score(mean, low_end, high_end), tuple(reached.tolist())
-        return cls(task, of_policy, low, high, method, mean, low_end, high_end, success, returns, each)
+        return cls(task, of_policy, low, high, method, mean, low_end, high_end, success, returns, each, camera_bits_s)
 
     def __str__(self) -> str:
         count = len(self.performances)
@@ -94,6 +97,7 @@ class Evaluation:
                 f"  performance  {self.performance:.3f}   nothing {self.nothing:.3f}, oracle {self.oracle:.3f}",
                 f"  success      {self.success:.3f}",
                 f"  return       {self.returns:.2f}",
+                *([] if np.isnan(self.camera_bits_s) else [f"  camera       {self.camera_bits_s / 1e6:.3g} Mbit/s"]),
             ]
         )
 

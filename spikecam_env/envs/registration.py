@@ -65,6 +65,9 @@ MUJOCO_ENVIRONMENTS: dict[str, tuple[str, dict[str, Any]]] = {
 }
 """As TASK_ENVIRONMENTS; many are stepped by Gymnasium's own vector environments."""
 
+ALL_TASKS = TASK_ENVIRONMENTS | MUJOCO_ENVIRONMENTS
+"""Those that an agent can learn and be scored on: with splits, an oracle and a performance."""
+
 SMALL_TASKS = tuple(name for name in TASK_ENVIRONMENTS if "-Full" not in name)
 
 OBSERVATIONS_ABOVE: dict[str, tuple[str, dict[str, Any]]] = {}

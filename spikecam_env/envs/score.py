@@ -62,6 +62,8 @@ class Played:
     """Time of a step in the environment alone [ms]."""
     steps: float
     """Steps of an episode."""
+    camera_bits_s: float
+    """What the camera sent [bits/s]; NaN where the environment has no camera."""
     performances: tuple[float, ...]
     """Performance in each episode."""
 
@@ -81,7 +83,7 @@ def play(env: gymnasium.Env[Any, Any], policy: Policy, seeds: Iterable[int], pro
     inner = judged_env(env)
     bar = tqdm(seeds, desc="episodes", unit="episode", leave=False, disable=None if progress is None else not progress)
     rows = [_episode(env, inner, policy, seed) for seed in bar]
-    returns, performance, success, distance, seconds, steps = (np.array(column) for column in zip(*rows, strict=True))
+    returns, performance, success, distance, seconds, steps, bits, time_s = map(np.array, zip(*rows, strict=True))
     return Played(
         returns=float(returns.mean()),
         performance=float(performance.mean()),
@@ -89,6 +91,7 @@ def play(env: gymnasium.Env[Any, Any], policy: Policy, seeds: Iterable[int], pro
         distance_px=float(distance.sum() / steps.sum()),
         ms_a_step=float(1e3 * seconds.sum() / steps.sum()),
         steps=float(steps.mean()),
+        camera_bits_s=float(bits.sum() / time_s.sum()),
         performances=tuple(performance.tolist()),
     )
 
@@ -126,12 +129,13 @@ def ends(env: gymnasium.Env[Any, Any], seeds: Sequence[int]) -> tuple[list[float
 
 def _episode(
     env: gymnasium.Env[Any, Any], inner: Any, policy: Policy, seed: int
-) -> tuple[float, float, bool, float, float, int]:
-    """(return, performance, success, distances' sum, seconds in steps, steps)."""
+) -> tuple[float, float, bool, float, float, int, float, float]:
+    """(return, performance, success, distances' sum, seconds in steps, steps, the camera's bits, time of the scene)."""
     inner.action_space.seed(seed)
     (count,) = inner.action_space.shape or (0,)
-    observation, _ = env.reset(seed=seed)
+    observation, info = env.reset(seed=seed)
     total, distance, seconds, steps, over = 0.0, 0.0, 0.0, 0, False
+    bits = info.get("camera_bits", np.nan)
     while not over:
         action = np.array(checked_action(policy(observation, inner), count), np.float32)
         began = time.perf_counter()
@@ -139,7 +143,9 @@ def _episode(
         seconds += time.perf_counter() - began
         over = terminated or truncated
         total, distance, steps = total + float(reward), distance + info["distance_px"], steps + 1
-    return total, info["performance"], info["is_success"], distance, seconds, steps
+        bits += info.get("camera_bits", np.nan)
+    time_s = info.get("time_s", np.nan)
+    return total, info["performance"], info["is_success"], distance, seconds, steps, bits, time_s
 
 
 def baselines(

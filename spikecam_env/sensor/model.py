@@ -207,6 +207,6 @@ def _in_physical_order(effects: Iterable[Effect]) -> tuple[Effect, ...]:
     return tuple(sorted(listed, key=lambda effect: order.index(effect.name)))
 
 
-def generator(seed: int, purpose: str) -> np.random.Generator:
-    """A random generator for one purpose of one seed, independent of all others."""
-    return np.random.default_rng([seed, zlib.crc32(purpose.encode())])
+def generator(seed: int, purpose: str, *numbers: int) -> np.random.Generator:
+    """A random generator for one purpose of one seed, independent of all others; `numbers`: which one of many."""
+    return np.random.default_rng([seed, zlib.crc32(purpose.encode()), *numbers])

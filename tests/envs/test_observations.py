@@ -18,12 +18,10 @@ from spikecam_env.envs.observations import (
     TFP,
     Blocks,
     CameraView,
-    FrameCamera,
     Observation,
     observation,
     restarted,
 )
-from spikecam_env.envs.observations.frame_camera import mean_light, shutter_open
 from spikecam_env.envs.registration import register
 from spikecam_env.errors import InputError
 from spikecam_env.sensor import Keyframes
@@ -103,56 +101,6 @@ def test_tfi_is_the_inverse_interval() -> None:
     np.testing.assert_array_equal(
         shown(TFI(), spikes, 8)[-1], np.floor(255 / shown(ISI(), spikes, 8)[-1] + np.float32(0.5))
     )
-
-
-def rising(light_at_start: float, light_at_end: float, frames: int) -> Keyframes:
-    ends = np.array([light_at_start, light_at_end], np.float32)[:, None, None]
-    return Keyframes(np.array([0.0, frames]), np.broadcast_to(ends, (2, *VIEW.shape)))
-
-
-def through(law: FrameCamera, light: Keyframes, steps: int) -> list[tuple[int, float]]:
-    """(grey value, age) after each step."""
-    state, seen = law.start(VIEW, 1), []
-    for _ in range(steps):
-        blocks = Blocks(np.zeros((1, 8, *VIEW.shape), np.uint8), [light], VIEW.frame_rate_hz)
-        picture, state = law.step(blocks, state)
-        assert picture.min() == picture.max()
-        seen.append((int(picture.max()), float(law.age(state)[0])))
-    return seen
-
-
-def test_frame_camera_gives_the_mean_light_of_its_last_whole_exposure() -> None:
-    """2000 Hz is a period of 20 frames; light rises by 1/80 a frame: means at frames 10, 30, 50."""
-    seen = through(FrameCamera(2000.0), rising(0.0, 1.0, 80), 8)
-    means = [0, 0, *[255 * 10 / 80] * 2, *[255 * 30 / 80] * 3, 255 * 50 / 80]
-    np.testing.assert_allclose([grey for grey, _ in seen], means, atol=0.51)
-    assert [age for _, age in seen] == [-1, -1, 4, 12, 0, 8, 16, 4]
-
-
-def test_a_short_exposure_is_sharp_and_early() -> None:
-    """0.1 ms are 4 frames: the exposures' middles are at frames 2 and 22."""
-    seen = through(FrameCamera(2000.0, exposure_s=1e-4), rising(0.0, 1.0, 80), 3)
-    np.testing.assert_allclose([grey for grey, _ in seen], [255 * 2 / 80, 255 * 2 / 80, 255 * 22 / 80], atol=0.51)
-
-
-def test_exposures_are_complete_at_rates_that_divide_no_block() -> None:
-    """30 Hz over ten seconds: 300 whole exposures, whose parts fill all the time."""
-    period = 40_000 / 30
-    parts = [part for first in range(0, 400_000, 40) for part in shutter_open(first, first + 40, period, period)]
-    assert sum(whole for *_, whole in parts) == 300
-    assert sum(closed - opened for opened, closed, _ in parts) == pytest.approx(400_000, rel=1e-12)
-
-
-def test_the_frame_camera_sees_the_light_of_the_environment() -> None:
-    """A scene at rest: the mean over the exposure is the true light."""
-    env = gymnasium.make(
-        DISK, **SMALL, obs=FrameCamera(5000.0), rpm=0.0, drift_px_s=0.0, ground_truth=True, obs_state=True
-    )
-    seen, info = env.reset(seed=0)
-    assert seen["age"] == 0 and info["age"] == 0
-    np.testing.assert_allclose(seen["picture"][0], 255 * info["radiance"], atol=0.51)
-    light = env.unwrapped.blocks.light[0]  # type: ignore[attr-defined]
-    np.testing.assert_allclose(mean_light(light, 2.25, 6.5), info["radiance"], rtol=1e-6)
 
 
 def test_before_the_denoiser_has_a_picture_it_is_the_noisy_rate_and_marked() -> None:
@@ -246,13 +194,9 @@ def test_bad_observations_are_named(options: dict[str, Any], message: str) -> No
         gymnasium.make(DISK, **SMALL, **options)
 
 
-def test_bad_parameters_are_named() -> None:
+def test_a_window_that_is_none_is_refused() -> None:
     with pytest.raises(InputError, match="window = 0"):
         TFP(0)
-    with pytest.raises(InputError, match=r"exposure_s = 0\.1"):
-        FrameCamera(30.0, exposure_s=0.1)
-    with pytest.raises(InputError, match="needs the light"):
-        FrameCamera(30.0).step(Blocks(stream()), FrameCamera(30.0).start(VIEW, 1))
 
 
 def test_model_and_light_of_one_episode() -> None:

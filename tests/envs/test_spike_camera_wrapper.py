@@ -268,6 +268,32 @@ def test_mujoco_inside_is_seen_between_its_steps_without_rendering() -> None:
     env.close()
 
 
+@pytest.mark.parametrize(
+    "name, package",
+    [("Ant-v5", ""), ("PointMaze_UMaze-v3", "gymnasium_robotics"), ("AdroitHandDoor-v1", "gymnasium_robotics")],
+)
+def test_robots_of_gymnasium_pass_its_checker_and_their_motion_is_seen(name: str, package: str) -> None:
+    """With all that is observed.  Fetch, hands and kitchen of Gymnasium-Robotics 1.4.2 do not start in MuJoCo 4."""
+    pytest.importorskip("mujoco", reason="needs mujoco")
+    if package:
+        gymnasium.register_envs(pytest.importorskip(package, reason=f"needs {package}: pip install gymnasium-robotics"))
+    env = SpikeCamera(gymnasium.make(name), "tfp", shape=(32, 32), obs_state=True, obs_inner=True)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", UserWarning)  # that the environment has a wrapper, and its own space no end
+        check_env(env, skip_render_check=True)
+    seen, _ = env.reset(seed=0)
+    first = env.light.radiance[-1]
+    for _ in range(10):
+        seen, _, _, _, info = env.step(env.action_space.high)  # type: ignore[attr-defined]
+    change = float(np.abs(env.light.radiance[-1] - first).max())
+    print(f"{name}: {seen['picture'].mean():.0f} of 255, light changed by up to {change:.2f} of white")
+    assert seen["picture"].any() and change > 0.05
+    assert (
+        info["time_s"] == pytest.approx(11 * env.step_s, abs=1 / 40_000) and seen["inner"] in env.env.observation_space
+    )
+    env.close()
+
+
 @pytest.mark.parametrize("mode", ["sync", "async"])
 def test_a_vector_is_a_vector_of_single_environments(mode: str) -> None:
     gymnasium.register("tests/Bar-v0", entry_point=lambda **given: Bar(**given), max_episode_steps=8)

@@ -5,7 +5,7 @@
 <!-- generated: formats -->         the table of file formats
 <!-- generated: benchmarks -->      speed by version
 <!-- generated: settings -->        settings of a diagnosis
-<!-- generated: event_pixel -->     parameters of the event camera
+<!-- generated: parameters CLASS --> a table of its parameters
 <!-- generated: task NAME -->       a task: the docstring of its class, and its scores
 <!-- generated: page FILE -->       a page at the root
 <!-- generated: part FILE TITLE --> a section of it, without its title
@@ -22,7 +22,7 @@ from collections.abc import Callable
 from importlib import import_module
 from pathlib import Path, PurePosixPath
 
-from tools.site import benchmarks, commands, event_pixel, settings, tasks
+from tools.site import benchmarks, commands, parameter_table, settings, tasks
 from tools.site.docstrings import as_restructured
 from tools.site.films import as_directives
 from tools.site.public import docstring_of, home_of, kind_of, names_of
@@ -59,9 +59,9 @@ def generated(what: str, of: str, folder: PurePosixPath) -> str:
         "api": lambda: "\n".join(_module(of)),
         "benchmarks": benchmarks.page,
         "commands": commands.page,
-        "event_pixel": event_pixel.page,
         "formats": _formats,
         "page": lambda: _from_root(of, folder),
+        "parameters": lambda: parameter_table.page(of),
         "part": lambda: _from_root(of.partition(" ")[0], folder, of.partition(" ")[2]),
         "settings": settings.page,
         "task": lambda: tasks.page(of),

@@ -1,1 +1,44 @@
-"""Classical controllers of MuJoCo tasks, a file each: from pictures and encoders to actions, and nothing is learned."""
+"""Classical players, which learn nothing: a file each, and which of them plays a task.
+
+A controller is made for an environment and acts like an `Agent`: `begin` an episode, then `act(observation)`.
+Observations are of `obs="tfp"`; tasks that turn a camera have the gaze beside it, MuJoCo tasks their encoders.
+"""
+
+from __future__ import annotations
+
+from pkgutil import resolve_name
+from typing import Any
+
+from spikecam_env.agents.playing import Actor
+from spikecam_env.agents.tracker import FINDERS
+from spikecam_env.errors import unknown_name
+
+TRACKER = "spikecam_env.agents.tracker:Tracker"
+HERE = "spikecam_env.agents.controllers"
+
+CONTROLLERS = dict.fromkeys(FINDERS, TRACKER) | {
+    "Return": f"{HERE}.return_ball:ReturnController",
+    "Balance": f"{HERE}.balance:BalanceController",
+}
+"""By task: place of its controller."""
+
+
+def classical(env: Any) -> Actor:
+    """The classical player of an environment's task.
+
+    Args:
+        env: a bare environment (`env.unwrapped`).
+
+    Raises:
+        InputError: for a task that none can play.
+
+    Example:
+        >>> import gymnasium
+        >>> type(classical(gymnasium.make("spikecam_env/Catch-v1").unwrapped)).__name__
+        'Tracker'
+    """
+    task = type(getattr(env, "task", env)).__name__
+    if task not in CONTROLLERS:
+        raise unknown_name("task of a classical controller", task, CONTROLLERS)
+    actor: Actor = resolve_name(CONTROLLERS[task])(env)
+    return actor

@@ -12,9 +12,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from spikecam_env.cli.live.players import Player
-from spikecam_env.envs.aiming import AimingEnv
-from spikecam_env.envs.registration import ENVIRONMENTS, TASK_ENVIRONMENTS
-from spikecam_env.envs.score import ends, score
+from spikecam_env.envs.registration import ALL_TASKS, ENVIRONMENTS
+from spikecam_env.envs.score import ends, judged_env, score
+from spikecam_env.envs.wrappers.any_env import spike_camera_of
 from spikecam_env.errors import InputError, unknown_name
 
 FPS = 25
@@ -38,7 +38,7 @@ class Moment:
     total: float
     """Reward of the episode so far."""
     info: dict[str, Any]
-    """As of `AimingEnv`."""
+    """As of `JudgedEnv`."""
     over: bool
     """Whether the episode ended with the step."""
 
@@ -54,7 +54,7 @@ def environment(name: str, player: Player, **options: Any) -> gymnasium.Env[Any,
     Raises:
         InputError: an unknown id, or an agent of a task with other actions.
     """
-    full, known = full_name(name), {**ENVIRONMENTS, **TASK_ENVIRONMENTS}
+    full, known = full_name(name), {**ENVIRONMENTS, **ALL_TASKS}
     if full not in known:
         raise unknown_name("id", name, (each.split("/")[1] for each in known))
     if full in ENVIRONMENTS:
@@ -73,10 +73,10 @@ def full_name(name: str) -> str:
 
 def episode(env: gymnasium.Env[Any, Any], player: Player, seed: int) -> Iterator[Moment]:
     """Reset, then step by step to the end of the episode."""
-    camera = env.unwrapped
-    if not isinstance(camera, AimingEnv):
-        raise TypeError(f"{type(camera).__name__} is no AimingEnv: it has no target")
-    camera.action_space.seed(seed)
+    camera, inner = spike_camera_of(env), judged_env(env)
+    if camera is None:
+        raise TypeError(f"{type(inner).__name__} has no spike camera before it")
+    inner.action_space.seed(seed)
     seen, info = env.reset(seed=seed)
     step, reward, total, over = 0, 0.0, 0.0, False
     while True:
@@ -84,7 +84,7 @@ def episode(env: gymnasium.Env[Any, Any], player: Player, seed: int) -> Iterator
         yield Moment(seed, step, info["frame"], info["time_s"], spikes, reward, total, info, over)
         if over:
             return
-        action = np.asarray(player.act(seen, camera), np.float32)
+        action = np.asarray(player.act(seen, inner), np.float32)
         seen, paid, terminated, truncated, info = env.step(action)
         step, reward, over = step + 1, float(paid), bool(terminated or truncated)
         total += reward
@@ -92,9 +92,12 @@ def episode(env: gymnasium.Env[Any, Any], player: Player, seed: int) -> Iterator
 
 def most_seconds(env: gymnasium.Env[Any, Any]) -> float:
     """Of an episode, at most [s]; known once there is one, so the first is begun."""
-    camera: Any = env.unwrapped
+    camera: Any = spike_camera_of(env)
     env.reset(seed=0)
-    limits = [camera.episode.steps, env.spec.max_episode_steps if env.spec is not None else None]
+    limits = [
+        camera.episode.steps if hasattr(camera, "episode") else None,
+        env.spec.max_episode_steps if env.spec is not None else None,
+    ]
     return float(min(limit for limit in limits if limit) * camera.step_s)
 
 

@@ -36,14 +36,13 @@ def player(name: str) -> Player:
     if not is_file(name) and name not in shipped():
         raise unknown_name("policy", name, (*BASELINES, *shipped()))
     agent = Agent.load(name)
-    sees = (("obs", agent.obs), ("obs_state", True))
-    return Player(acting(agent), sees, agent.policy.recipe.actions)
+    return Player(acting(agent), tuple(agent.sees.items()), agent.policy.recipe.actions)
 
 
 def steering(held: Iterable[str]) -> Policy:
     """Whoever holds these keys down: the action of a step is that of the keys as they are when it begins."""
 
-    def act(seen: Any, env: AimingEnv) -> NDArray[np.float32]:
+    def act(seen: Any, env: Any) -> NDArray[np.float32]:
         return action_of(held, env.axes, _further(env), env.answers)
 
     return act

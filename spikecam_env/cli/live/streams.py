@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from spikecam_env.cli.live.episodes import Moment, episode
 from spikecam_env.cli.live.players import Player
+from spikecam_env.envs.wrappers.any_env import spike_camera_of
 
 if TYPE_CHECKING:
     from scenes import Scene
@@ -69,7 +70,7 @@ def of_scene(name: str, scene: Scene, sensor: SpikeSensor, frames: int, every: i
 
 def of_episode(name: str, env: gymnasium.Env[Any, Any], acting: Player, seed: int, frames: int) -> Stream:
     """Steps of an episode; the last that ends by `frames`, or the episode's."""
-    camera: Any = env.unwrapped
+    camera: Any = spike_camera_of(env)
     moments = takewhile(lambda moment: moment.frame <= frames, episode(env, acting, seed))
     return Stream(name, camera.shape, camera.model.frame_rate_hz, frames, map(_of_moment, moments))
 
@@ -82,8 +83,8 @@ def _of_moment(moment: Moment) -> Block:
         "return/return": moment.total,
         "performance/performance": info["performance"],
         "distance/distance [px]": info["distance_px"],
-        "gaze/pan [px]": info["gaze"][0],
-        "gaze/tilt [px]": info["gaze"][1],
     }
+    if "gaze" in info:
+        figures |= dict(zip(("gaze/pan [px]", "gaze/tilt [px]"), info["gaze"], strict=True))
     first = moment.frame - len(moment.spikes)
     return Block(first, moment.spikes, {name: float(value) for name, value in figures.items()}, (float(x), float(y)))

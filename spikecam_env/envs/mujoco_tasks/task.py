@@ -82,6 +82,8 @@ class MujocoTask(OwnLength):
     """Numbers of an action."""
     sensed_numbers: ClassVar[int]
     """Numbers that the encoders measure."""
+    answers: ClassVar[int] = 0
+    """Answers that an action can give, its last numbers, after the number that says one."""
     stream: ClassVar[int]
     """Stream of random numbers, another of every task."""
 
@@ -100,6 +102,7 @@ class MujocoTask(OwnLength):
         self.render_mode = render_mode
         self.model = mujoco.MjModel.from_xml_string(self.xml())
         self.data = mujoco.MjData(self.model)
+        mujoco.mj_forward(self.model, self.data)
         self._lamps = _Lamps(self.model)
         self._substeps = round(STEP_S / self.model.opt.timestep)
         self.action_space = spaces.Box(-1.0, 1.0, (self.actions,), np.float32)

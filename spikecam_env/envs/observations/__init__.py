@@ -10,6 +10,7 @@ from typing import Any
 from spikecam_env.envs.observations.blocks import Multibinary, Packed, Spikes, block_shape
 from spikecam_env.envs.observations.events import EventCounts
 from spikecam_env.envs.observations.frame_camera import FrameCamera
+from spikecam_env.envs.observations.frame_sensor import HIGH_SPEED, FrameSensor
 from spikecam_env.envs.observations.intervals import ISI, TFI
 from spikecam_env.envs.observations.playback import TFP
 from spikecam_env.envs.observations.protocol import Blocks, CameraView, Observation, replaced, restarted, with_rows
@@ -20,6 +21,7 @@ from spikecam_env.errors import InputError, shown, unknown_name
 from spikecam_env.renamed import old_names
 
 __all__ = [
+    "HIGH_SPEED",
     "ISI",
     "OBSERVATIONS",
     "TFI",
@@ -28,6 +30,7 @@ __all__ = [
     "CameraView",
     "EventCounts",
     "FrameCamera",
+    "FrameSensor",
     "Multibinary",
     "Observation",
     "ObservedStream",
@@ -58,8 +61,11 @@ OBSERVATIONS: dict[str, Callable[[], Observation]] = {
     "tfi": TFI,
     "isi": ISI,
     **{name: partial(_of_place, place, keywords) for name, (place, keywords) in OBSERVATIONS_ABOVE.items()},
-    "frame30": partial(FrameCamera, 30.0),
-    "frame1000": partial(FrameCamera, 1000.0),
+    **{
+        f"{scale}frame{rate}": partial(FrameCamera, float(rate), gamma=gamma, sensor=sensor)
+        for rate, sensor in ((30, FrameSensor()), (120, FrameSensor()), (1000, HIGH_SPEED))
+        for scale, gamma in (("", 1.0), ("root_", 0.5))
+    },
     "events": EventCounts,
 }
 
