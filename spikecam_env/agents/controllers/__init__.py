@@ -18,6 +18,7 @@ HERE = "spikecam_env.agents.controllers"
 
 CONTROLLERS = dict.fromkeys(FINDERS, TRACKER) | {
     "Return": f"{HERE}.return_ball:ReturnController",
+    "Balance": f"{HERE}.balance:BalanceController",
 }
 """By task: place of its controller."""
 
