@@ -132,6 +132,7 @@ class Dodge(MujocoTask):
             for n in range(THREATS + DECOYS)
         )
         through = 'contype="0" conaffinity="0"'
+        bounce = 'solref="-2.5e6 -160" solimp=".99 .99 .001"'  # stiffness and damping: contact of 2 ms
         return f"""<mujoco model="dodge">
 <option timestep="0.0005" integrator="Euler" gravity="0 0 0"/>
 <visual><quality shadowsize="0" numslices="16" numstacks="8"/><map znear=".01" zfar="20"/>
@@ -143,7 +144,8 @@ class Dodge(MujocoTask):
 <geom type="box" size="1.2 1.2 .01" pos="{EYE_X} 0 -.05" material="table" {through}/>
 <geom type="box" size=".4 1.2 .01" pos="{ROOF + 0.4} 0 .05" rgba=".3 .3 .32 1" {through}/>
 <body name="puck"><joint type="slide" axis="1 0 0"/><joint type="slide" axis="0 1 0"/>
-<geom type="cylinder" size="{PUCK} .03" mass="{CAN.mass}" rgba=".9 .45 .1 1" contype="0" conaffinity="1"/></body>
+<geom type="cylinder" size="{PUCK} .03" mass="{CAN.mass}" rgba=".9 .45 .1 1" contype="0" conaffinity="1"
+ priority="1" condim="1" {bounce}/></body>
 {balls}</worldbody>
 </mujoco>"""
 
