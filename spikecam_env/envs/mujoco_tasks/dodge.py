@@ -45,7 +45,7 @@ LANES = np.array([-1.0, -1.0, 1.0, 1.0]) * (TOUCH + SLACK) + np.array([-0.12, 0.
 BESIDE = (0.045, 0.065)
 """Least and greatest distance of a gap from the puck at the throw [m]; the ball between them hits the puck."""
 SHEAR, JITTER = 0.2, 0.03
-"""Farthest that a volley, and a ball in it, begins beside its lane [m]: lines are inclined by up to 20 degrees."""
+"""Farthest that a volley, and a ball in it, begins beside its lane [m]: lines are inclined by up to 22 degrees."""
 DECOYS = 6
 """Other balls of the model."""
 WIDE = (0.25, 0.5)
@@ -111,7 +111,7 @@ class Dodge(MujocoTask):
         Place over the reach and speed over the top speed, of both axes.
     Reward:
         20 times the change of how far the puck is from the nearest line on which a ball comes, as a share of the
-        distance at which they touch, 1 at most; 10 more at the end of an episode without a touch.
+        distance at which they touch, 1 at most, and 0 after a touch; 10 more at the end of an episode without one.
     End:
         Terminated when a ball touches the puck or all have passed; 300 steps at most.
     Success:
@@ -182,13 +182,11 @@ class Dodge(MujocoTask):
 
     def verdict(self) -> Verdict:
         """See `MujocoTask.verdict`."""
+        if self._hit:
+            return Verdict(False, 0.0, 0.0)
         place, _ = self._puck()
         worth = min(1.0, float(clearance(place[None], *self._coming())[0]) / TOUCH)
-        end = None
-        if self._hit:
-            end = False
-        elif self._passed()[:THREATS].all():
-            end = True
+        end = True if self._passed()[:THREATS].all() else None
         return Verdict(end, float(end is True), worth)
 
     def best_action(self) -> NDArray[np.float32]:
