@@ -31,13 +31,13 @@ LEFT = 5
 SPOTS = 3
 """Of a track, from which on it counts."""
 FLAT = 0.1
-"""Standard deviation of lines' slopes: SHEAR over HATCH, evenly drawn, and a puck that is off its rest."""
+"""Standard deviation of lines' slopes, about that of even draws up to SHEAR over HATCH (0.12)."""
 MISS = 0.004
 """Standard deviation of a spot's place [m]: a fifth of a pixel of 64."""
 
 
 class DodgeController:
-    """Acts like an `Agent`: `begin` an episode, then `act(observation)`.
+    """Acts like an `Agent`: `begin` an episode, then `act(observation)`, of `obs="tfp"` and `obs_inner=True`.
 
     Args:
         env: the bare task, whose picture it is made for.
