@@ -19,6 +19,8 @@ HERE = "spikecam_env.agents.controllers"
 CONTROLLERS = dict.fromkeys(FINDERS, TRACKER) | {
     "Return": f"{HERE}.return_ball:ReturnController",
     "Balance": f"{HERE}.balance:BalanceController",
+    "Dodge": f"{HERE}.dodge:DodgeController",
+    "Read": f"{HERE}.read:ReadController",
 }
 """By task: place of its controller."""
 

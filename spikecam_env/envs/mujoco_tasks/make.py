@@ -7,13 +7,14 @@ from typing import Any
 
 from scenes.mujoco import MujocoLight
 from spikecam_env.envs.mujoco_tasks.balance import Balance
+from spikecam_env.envs.mujoco_tasks.dodge import Dodge
 from spikecam_env.envs.mujoco_tasks.return_ball import Return
 from spikecam_env.envs.mujoco_tasks.task import EYE, MIDDLE_LEVEL, MujocoTask
 from spikecam_env.envs.observations import CameraView
 from spikecam_env.envs.wrappers.any_env import SpikeCamera
 from spikecam_env.errors import unknown_name
 
-MUJOCO_TASKS: dict[str, type[MujocoTask]] = {"Return": Return, "Balance": Balance}
+MUJOCO_TASKS: dict[str, type[MujocoTask]] = {"Return": Return, "Dodge": Dodge, "Balance": Balance}
 """By name."""
 SUPERSAMPLE = 2
 """Samples a pixel and axis: light of moving edges is then 1.9 % rms from that of eight times as many keys and 4 x 4
