@@ -8,7 +8,9 @@ Inputs of the physics stay the same within a step, so that a camera can have the
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
+from types import MappingProxyType
 from typing import Any, ClassVar
 
 import numpy as np
@@ -82,6 +84,10 @@ class MujocoTask(OwnLength):
     """Numbers of an action."""
     sensed_numbers: ClassVar[int]
     """Numbers that the encoders measure."""
+    answers: ClassVar[int] = 0
+    """Answers that an action can give: its last numbers, after the number that says one; 0 where nothing is asked."""
+    camera_defaults: ClassVar[Mapping[str, Any]] = MappingProxyType({})
+    """Keywords of `make_task` that this task needs others of than usual."""
     stream: ClassVar[int]
     """Stream of random numbers, another of every task."""
 
@@ -98,7 +104,7 @@ class MujocoTask(OwnLength):
         if render_mode not in (None, *self.metadata["render_modes"]):
             raise unknown_name("render_mode", render_mode, self.metadata["render_modes"])
         self.render_mode = render_mode
-        self.model = mujoco.MjModel.from_xml_string(self.xml())
+        self.model = mujoco.MjModel.from_xml_string(self.xml(), self.assets())
         self.data = mujoco.MjData(self.model)
         self._lamps = _Lamps(self.model)
         self._substeps = round(STEP_S / self.model.opt.timestep)
@@ -112,6 +118,10 @@ class MujocoTask(OwnLength):
     def xml(self) -> str:
         """The model (MJCF), with a camera named EYE and a timestep that divides STEP_S."""
         raise NotImplementedError
+
+    def assets(self) -> dict[str, bytes]:
+        """Files that the model names, such as textures, by their names."""
+        return {}
 
     def arrange(self, rng: np.random.Generator, level: int) -> float:
         """Put all in place for an episode of this level, in model and data, which are as loaded but for what this
