@@ -1,0 +1,1 @@
+"""Classical controllers of MuJoCo tasks, from pictures alone; a file each."""
