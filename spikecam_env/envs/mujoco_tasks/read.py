@@ -45,7 +45,7 @@ BEFORE_S = (0.001, 0.006)
 AFTER_S = 0.005
 """Time to answer after the sled has left the view [s]."""
 LETTERS = "AEFHKLNPTX"
-"""Letters, of which none looks like a digit."""
+"""Letters, without those that could be digits (B, I, O, S, Z)."""
 VARIANTS = 4
 """Fonts, strokes and slants in which every character is there."""
 TEXTURE_SIDE = 128

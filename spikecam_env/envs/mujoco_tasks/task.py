@@ -85,11 +85,11 @@ class MujocoTask(OwnLength):
     sensed_numbers: ClassVar[int]
     """Numbers that the encoders measure."""
     answers: ClassVar[int] = 0
-    """Answers that an action can give: its last numbers, after the number that says one; 0 where nothing is asked."""
-    camera_defaults: ClassVar[Mapping[str, Any]] = MappingProxyType({})
-    """Keywords of `make_task` that this task needs others of than usual."""
+    """Answers that an action can give, its last numbers, after the number that says one."""
     stream: ClassVar[int]
     """Stream of random numbers, another of every task."""
+    camera_defaults: ClassVar[Mapping[str, Any]] = MappingProxyType({})
+    """Keywords of `make_task` that are other than usual, such as block_frames; given ones go before them."""
 
     def __init__(
         self,
