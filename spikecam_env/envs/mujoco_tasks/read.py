@@ -70,11 +70,11 @@ class ReadLevel:
 
 
 LEVEL = {
-    1: ReadLevel(15.625, 1.0, 0),
-    2: ReadLevel(31.25, 0.7, 0),
-    3: ReadLevel(62.5, 0.5, 1),
-    4: ReadLevel(109.375, 0.35, 2),
-    5: ReadLevel(156.25, 0.2, 2),
+    1: ReadLevel(15.625, 0.8, 0),
+    2: ReadLevel(31.25, 0.4, 0),
+    3: ReadLevel(62.5, 0.2, 1),
+    4: ReadLevel(109.375, 0.12, 2),
+    5: ReadLevel(156.25, 0.08, 2),
 }
 """5, 10, 20, 35 and 50 pixels a millisecond; the last is just below the record on rails (TGV, 2007: 160 m/s)."""
 
@@ -104,7 +104,9 @@ class Read(MujocoTask):
     actions: ClassVar[int] = 1 + answers
     sensed_numbers: ClassVar[int] = 1
     stream: ClassVar[int] = 23
-    camera_defaults: ClassVar[Mapping[str, Any]] = MappingProxyType({"block_frames": BLOCK_FRAMES, "motion_per_key": 1.5})
+    camera_defaults: ClassVar[Mapping[str, Any]] = MappingProxyType(
+        {"block_frames": BLOCK_FRAMES, "motion_per_key": 1.5}
+    )
 
     def xml(self) -> str:
         """See `MujocoTask.xml`; x is along the rail, y away from the camera, z up."""

@@ -103,9 +103,7 @@ def test_the_sled_rises_and_falls_as_a_damped_spring_does() -> None:
     for _ in range(40):
         env.step(SILENCE)
     t = env.data.time
-    law = np.exp(-decay * t) * (
-        start * np.cos(damped * t) + (speed + decay * start) / damped * np.sin(damped * t)
-    )
+    law = np.exp(-decay * t) * (start * np.cos(damped * t) + (speed + decay * start) / damped * np.sin(damped * t))
     print(f"after {1e3 * t:.0f} ms {1e3 * rise.qpos[0]:.3f} mm, by the law {1e3 * law:.3f} mm")
     assert rise.qpos[0] == pytest.approx(law, abs=0.02 * largest)
 
@@ -130,7 +128,7 @@ def test_an_episode_follows_from_its_number() -> None:
     for options in ({"episode": 7, "split": "test", "level": 5}, {"episode": 8, "level": 2}):
         infos = [env.reset(seed=seed, options=options)[1] for seed in (0, 1)]
         assert infos[0]["episode_number"] == options["episode"] and infos[0]["level"] == options["level"]
-        assert data_equivalence(*infos, exact=True)
+        assert data_equivalence(infos[0], infos[1], exact=True)
     assert {env.reset(seed=seed)[1]["level"] for seed in range(40)} == {1, 2, 3, 4, 5}
 
 
@@ -166,7 +164,7 @@ def test_the_light_of_a_block_is_within_five_percent_of_that_of_many_more_keys(l
         env.reset(seed=1)
         over, seen = False, []
         while not over:
-            _, _, over, _, info = env.step(SILENCE)
+            _, _, over, _, _ = env.step(SILENCE)
             seen.append(mean_light(env.light, 8))
         env.close()
         return np.stack(seen)
@@ -180,12 +178,14 @@ def test_the_light_of_a_block_is_within_five_percent_of_that_of_many_more_keys(l
 
 def mean_light(keys: Keyframes, frames: int) -> NDArray[Any]:
     """(H, W) of the last frames."""
-    return np.mean([keys.at(t) for t in np.linspace(keys.frame[-1] - frames, keys.frame[-1], 16 * frames + 1)], axis=0)
+    times = np.linspace(keys.frame[-1] - frames, keys.frame[-1], 16 * frames + 1)
+    return np.asarray(np.mean([keys.at(t) for t in times], axis=0))
 
 
 def test_a_reader_from_pictures_alone_reads() -> None:
     env = make_task("Read", level=2, split="test", obs="tfp", obs_state=True, obs_inner=True)
-    reader: Any = ReadController(env.unwrapped)
+    bare: Any = env.unwrapped
+    reader = ReadController(bare)
     for seed in range(3):
         observation, _ = env.reset(seed=seed)
         reader.begin()
