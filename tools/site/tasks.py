@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from pathlib import Path
 
+from spikecam_env.envs.mujoco_tasks import MUJOCO_TASKS
 from spikecam_env.envs.tasks import TASKS
 from tools.site.sections import rows_of, section
 
@@ -22,7 +23,7 @@ def page(name: str) -> str:
 
 
 def _class(name: str) -> Iterator[str]:
-    kind = TASKS[name]
+    kind = (TASKS | MUJOCO_TASKS)[name]
     yield from (f"Ids: `spikecam_env/{name}-v1` (64 x 64), `spikecam_env/{name}-Full-v1` (250 x 400).", "")
     yield from ("```{eval-rst}", f".. autoclass:: {kind.__module__}.{kind.__name__}", "```", "")
     yield from ("[Tasks](../environments.md): observation, action, reward and score, which all tasks share.", "")

@@ -70,11 +70,11 @@ class ReadLevel:
 
 
 LEVEL = {
-    1: ReadLevel(15.625, 0.8, 0),
-    2: ReadLevel(31.25, 0.4, 0),
-    3: ReadLevel(62.5, 0.2, 1),
-    4: ReadLevel(109.375, 0.12, 2),
-    5: ReadLevel(156.25, 0.08, 2),
+    1: ReadLevel(15.625, 1.0, 0),
+    2: ReadLevel(31.25, 0.6, 0),
+    3: ReadLevel(62.5, 0.4, 1),
+    4: ReadLevel(109.375, 0.2, 2),
+    5: ReadLevel(156.25, 0.1, 2),
 }
 """5, 10, 20, 35 and 50 pixels a millisecond; the last is just below the record on rails (TGV, 2007: 160 m/s)."""
 
