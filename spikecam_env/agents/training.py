@@ -93,7 +93,7 @@ SIGHTS: dict[str, dict[str, Any]] = {
 the rates of a camera without noise."""
 
 LAGS = {"Catch": (0, 2, 5), "Saccade": (0, 3), "ReadSpin": (0, 1, 2, 4), "LowLight": (0, 1, 2, 3, 4)}
-LAGS |= dict.fromkeys(MUJOCO_TASKS, (0, 2, 5, 10))
+LAGS |= dict.fromkeys(MUJOCO_TASKS, (0, 2, 5, 10)) | {"Read": (0, 1, 2, 3)}
 """Steps ago of the pictures that a task is learned from; others from (0, 4).  In the dark every spike counts."""
 POOL = {"Saccade": 1, "ReadDigit": 1} | dict.fromkeys(MUJOCO_TASKS, 1)
 """Pixels squared that are averaged; others 2.  Spokes, strokes and far balls are finer than two pixels."""

@@ -55,7 +55,7 @@ TASK_ENVIRONMENTS: dict[str, tuple[str, dict[str, Any]]] = {
 """As ENVIRONMENTS.  Their episodes end by themselves, in the task's time whatever `frames_per_step` is: so `spec` of an
 environment that was made has the right `max_episode_steps`, and the registered one has none."""
 
-MUJOCO_NAMES = ("Return", "Dodge", "Balance")
+MUJOCO_NAMES = ("Return", "Dodge", "Balance", "Read")
 """As of `envs.mujoco_tasks.MUJOCO_TASKS`: tasks of `pip install 'spikecam-env[mujoco]'`."""
 
 MUJOCO_ENVIRONMENTS: dict[str, tuple[str, dict[str, Any]]] = {

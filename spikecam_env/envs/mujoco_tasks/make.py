@@ -8,13 +8,15 @@ from typing import Any
 from scenes.mujoco import MujocoLight
 from spikecam_env.envs.mujoco_tasks.balance import Balance
 from spikecam_env.envs.mujoco_tasks.dodge import Dodge
+from scenes.mujoco.light import MOTION_PER_KEY
+from spikecam_env.envs.mujoco_tasks.read import Read
 from spikecam_env.envs.mujoco_tasks.return_ball import Return
 from spikecam_env.envs.mujoco_tasks.task import EYE, MIDDLE_LEVEL, MujocoTask
 from spikecam_env.envs.observations import CameraView
 from spikecam_env.envs.wrappers.any_env import SpikeCamera
 from spikecam_env.errors import unknown_name
 
-MUJOCO_TASKS: dict[str, type[MujocoTask]] = {"Return": Return, "Dodge": Dodge, "Balance": Balance}
+MUJOCO_TASKS: dict[str, type[MujocoTask]] = {"Return": Return, "Dodge": Dodge, "Balance": Balance, "Read": Read}
 """By name."""
 SUPERSAMPLE = 2
 """Samples a pixel and axis: light of moving edges is then 1.9 % rms from that of eight times as many keys and 4 x 4
@@ -26,9 +28,11 @@ class EyeLight:
     """Makes the light that falls into a task's camera; a value, so that Gymnasium can compare specifications."""
 
     supersample: int = SUPERSAMPLE
+    motion_per_key: float = MOTION_PER_KEY
 
     def __call__(self, env: Any, view: CameraView) -> MujocoLight:
-        return MujocoLight.of_env(env, view, camera=EYE, supersample=self.supersample)
+        options = {"supersample": self.supersample, "motion_per_key": self.motion_per_key}
+        return MujocoLight.of_env(env, view, camera=EYE, **options)
 
 
 def make_task(
@@ -50,7 +54,8 @@ def make_task(
         shape: (rows, columns).
         render_mode: "rgb_array" or None; of the scene in colour, as a person sees it.
         supersample: samples a pixel and axis of the light.
-        camera: keywords of `SpikeCamera`: obs, obs_state, obs_inner, model, scale, mean_interval, engine, threads.
+        camera: keywords of `SpikeCamera`: obs, obs_state, obs_inner, model, block_frames, scale, mean_interval, engine,
+            threads; and motion_per_key of `MujocoLight`. A task may have `camera_defaults` of its own.
 
     Raises:
         InputError: for a value out of range or unknown, and where MuJoCo is missing.
@@ -65,4 +70,6 @@ def make_task(
     if task not in MUJOCO_TASKS:
         raise unknown_name("task", task, MUJOCO_TASKS)
     inner = MUJOCO_TASKS[task](level=level, split=split, shape=shape, render_mode=render_mode)
-    return SpikeCamera(inner, shape=shape, make_light=EyeLight(supersample), **camera)
+    given = {"motion_per_key": MOTION_PER_KEY, **inner.camera_defaults, **camera}
+    light = EyeLight(supersample, given.pop("motion_per_key"))
+    return SpikeCamera(inner, shape=shape, make_light=light, **given)

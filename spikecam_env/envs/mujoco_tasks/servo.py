@@ -36,7 +36,7 @@ class Servo:
 
         Example:
             >>> servo = Servo(acceleration=100.0, top=5.0, mass=0.2)
-            >>> servo.force(np.array([1.0]), np.zeros(1), np.zeros(1), 0.001).tolist()
+            >>> servo.force(np.array([1.0]), np.zeros(1), np.zeros(1), 0.001).round(6).tolist()
             [20.0]
         """
         change = self.acceleration * step_s

@@ -8,7 +8,9 @@ Inputs of the physics stay the same within a step, so that a camera can have the
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
+from types import MappingProxyType
 from typing import Any, ClassVar
 
 import numpy as np
@@ -86,6 +88,8 @@ class MujocoTask(OwnLength):
     """Answers that an action can give, its last numbers, after the number that says one."""
     stream: ClassVar[int]
     """Stream of random numbers, another of every task."""
+    camera_defaults: ClassVar[Mapping[str, Any]] = MappingProxyType({})
+    """Keywords of `make_task` that are other than usual, such as block_frames; given ones go before them."""
 
     def __init__(
         self,
@@ -100,7 +104,7 @@ class MujocoTask(OwnLength):
         if render_mode not in (None, *self.metadata["render_modes"]):
             raise unknown_name("render_mode", render_mode, self.metadata["render_modes"])
         self.render_mode = render_mode
-        self.model = mujoco.MjModel.from_xml_string(self.xml())
+        self.model = mujoco.MjModel.from_xml_string(self.xml(), self.assets())
         self.data = mujoco.MjData(self.model)
         mujoco.mj_forward(self.model, self.data)
         self._lamps = _Lamps(self.model)
@@ -115,6 +119,10 @@ class MujocoTask(OwnLength):
     def xml(self) -> str:
         """The model (MJCF), with a camera named EYE and a timestep that divides STEP_S."""
         raise NotImplementedError
+
+    def assets(self) -> dict[str, bytes]:
+        """Files that the model names, such as textures, by their names."""
+        return {}
 
     def arrange(self, rng: np.random.Generator, level: int) -> float:
         """Put all in place for an episode of this level, in model and data, which are as loaded but for what this
@@ -174,7 +182,8 @@ class MujocoTask(OwnLength):
         brightness = self.arrange(episode_generator(split, self._number, self.stream), self.level)
         self._lamps.shine(brightness)
         mujoco.mj_forward(self.model, self.data)
-        self._steps, self._verdict = 0, self.verdict()
+        self._steps = 0
+        self._verdict = self.verdict()
         return self._observed(), self._info()
 
     def step(self, action: ArrayLike) -> tuple[NDArray[np.float32], float, bool, bool, dict[str, Any]]:

@@ -22,8 +22,19 @@ SLANT = 0.25
 """Most that a digit leans either way [shift over height]; an italic font has 0.2 to 0.3."""
 
 
-def digit(name: str, size: int, rng: np.random.Generator) -> Texture:
-    """(size, size), of `name` in DIGITS."""
+def digit(name: str, size: int, rng: np.random.Generator, *, bar: bool = True) -> Texture:
+    """(size, size) of a digit, or of a letter.
+
+    Args:
+        name: one of DIGITS, or a capital.
+        size: side of the picture [pixels].
+        rng: draws font, stroke, width and slant.
+        bar: whether a bar is below; without, the digit is in the middle.
+
+    Example:
+        >>> digit("7", 32, np.random.default_rng(0), bar=False).shape
+        (32, 32)
+    """
     fine = 4 * size
     font, stroke = int(rng.choice(FONTS)), round(rng.uniform(*STROKE) * HEIGHT * fine)
     width, slant = rng.uniform(*WIDTH), rng.uniform(-SLANT, SLANT)
@@ -31,10 +42,11 @@ def digit(name: str, size: int, rng: np.random.Generator) -> Texture:
     scale = HEIGHT * fine / unit
     (across, down), _ = cv2.getTextSize(name, font, scale, 1)
     picture = np.ones((fine, fine), np.float32)
-    left, bottom = (fine - across) // 2, (fine + down - 2 * stroke) // 2
+    left, bottom = (fine - across) // 2, (fine + down - 2 * stroke * bar) // 2
     cv2.putText(picture, name, (left, bottom), font, scale, 0.0, stroke, cv2.LINE_AA)
-    bar = bottom + 2 * stroke
-    cv2.line(picture, (fine // 3, bar), (2 * fine // 3, bar), 0.0, stroke, cv2.LINE_AA)
+    if bar:
+        under = bottom + 2 * stroke
+        cv2.line(picture, (fine // 3, under), (2 * fine // 3, under), 0.0, stroke, cv2.LINE_AA)
     middle = fine / 2
     lean = np.array([[width, -slant, middle * (1 - width + slant)], [0.0, 1.0, 0.0]])
     leant = cv2.warpAffine(picture, lean, (fine, fine), borderMode=cv2.BORDER_REPLICATE)

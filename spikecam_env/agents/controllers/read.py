@@ -1,0 +1,144 @@
+"""A classical reader: plates of every character, smeared as motion smears them, are correlated with the pictures.
+
+    evidence of a character at a column     -n/2 log(1 - r^2),  r: normalised correlation of n pixels
+    evidence of a character on a path       its sum over the steps, along a place that moves evenly
+    a path is a number's                    by the evidence of its best digit, less that of its best letter
+
+The answer is given when the best path has left the picture, or just before the earliest end of an episode.
+"""
+
+from __future__ import annotations
+
+from math import ceil
+from typing import Any
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from spikecam_env.envs.mujoco_tasks.read import (
+    AFTER_S,
+    BEFORE_S,
+    BLOCK_FRAMES,
+    LETTERS,
+    LEVEL,
+    PLATE,
+    RISE,
+    SLED,
+    SPEEDS_APART,
+    VARIANTS,
+    VIEW,
+    Read,
+    plate,
+)
+from spikecam_env.envs.mujoco_tasks.task import STEP_S
+from spikecam_env.envs.tasks.digits import DIGITS
+from spikecam_env.types import Floats, Pictures
+
+BLOCK_S = BLOCK_FRAMES / 40_000
+"""Time of an observed block [s]."""
+SPEEDS = 9
+"""Speeds that are tried about each level's."""
+TOLERANCE = 2
+"""Pixels by which a plate may lie beside its path."""
+CHANCE = 1.5
+"""Evidence that chance gives, over the most in the first picture, in which there is no sled."""
+SURE = 60.0
+"""Evidence of a digit over that of letters [nats] at which it is believed."""
+
+
+class ReadController:
+    """Reads the plate: `begin` an episode, then `act(observation)`.
+
+    Args:
+        env: the task, whose shape and levels it is made for; observations are of `obs="tfp"` and the task's own block.
+
+    Example:
+        >>> env = Read(level=1)
+        >>> controller = ReadController(env)
+        >>> controller.begin()
+        >>> float(controller.act({"picture": np.zeros((1, 64, 64), np.uint8)})[0])
+        -1.0
+    """
+
+    def __init__(self, env: Read) -> None:
+        self._scale = env.shape[0] / VIEW
+        lowest, highest = env.levels
+        self._levels = [_Speed(LEVEL[level].speed, self._scale) for level in range(lowest, highest + 1)]
+        passage = (VIEW * env.shape[1] / env.shape[0] + SLED[0]) / (LEVEL[lowest].speed * (1 + SPEEDS_APART))
+        self._last = ceil((BEFORE_S[0] + passage + AFTER_S) / STEP_S)
+        self._steps = 0
+
+    def begin(self) -> None:
+        """Forget all pictures: an episode begins."""
+        self._steps = 0
+        for level in self._levels:
+            level.evidence.clear()
+
+    def act(self, observation: dict[str, NDArray[Any]]) -> NDArray[np.float32]:
+        """The action, (11,)."""
+        picture = observation["picture"][0].astype(np.float32)
+        found = [level.found(self._seen(picture)) for level in self._levels]
+        margin, number, is_gone = max(found)
+        self._steps += 1
+        action = np.zeros(1 + len(DIGITS), np.float32)
+        action[0] = 1.0 if (is_gone and margin > SURE) or self._steps >= self._last else -1.0
+        action[1 + number] = 1.0
+        return action
+
+    def _seen(self, picture: Pictures) -> Pictures:
+        """The rows in which plates can be, with room at both sides for plates that are partly out of view."""
+        half = round((PLATE[1] / 2 + RISE) * self._scale) + TOLERANCE
+        rows, beside = picture.shape[0], round(PLATE[0] / 2 * self._scale)
+        cut = picture[max(0, rows // 2 - half) : rows // 2 + half]
+        return np.pad(cut, ((0, 0), (beside, beside)), constant_values=float(cut.mean()))
+
+
+class _Speed:
+    """Plates and paths of a level."""
+
+    def __init__(self, speed: float, scale: float) -> None:
+        self._px_a_step = speed * scale * STEP_S
+        smear = max(1, round(speed * scale * BLOCK_S))
+        size = round(PLATE[0] * scale), round(PLATE[1] * scale)
+        self._plates = [
+            [_smeared(plate(name, variant), size, smear) for variant in range(VARIANTS)] for name in (*DIGITS, *LETTERS)
+        ]
+        self.evidence: list[Floats] = []
+        """(characters, columns) of every step."""
+
+    def found(self, picture: Pictures) -> tuple[float, int, bool]:
+        """Evidence of the best number with this further picture, the number, and whether it has left the picture."""
+        seen = np.stack([_evidence(picture, variants) for variants in self._plates])
+        if not self.evidence:
+            self._chance = CHANCE * seen.max(axis=1, keepdims=True)
+        self.evidence.append(np.maximum(seen - self._chance, 0.0))
+        now, columns = len(self.evidence) - 1, seen.shape[1]
+        room = int(self._px_a_step * (1 + SPEEDS_APART) * now)
+        best = (-np.inf, 0, False)
+        for speed in self._px_a_step * np.linspace(1 - SPEEDS_APART, 1 + SPEEDS_APART, SPEEDS):
+            for heading in (-1, 1):
+                end = np.arange(0, columns + room, TOLERANCE)  # places now, in the direction of motion
+                total = np.zeros((len(self._plates), len(end)))
+                for step, evidence in enumerate(self.evidence):
+                    then = np.rint(end - speed * (now - step)).astype(int)
+                    inside = (then >= 0) & (then < columns)
+                    total[:, inside] += evidence[:, then[inside] if heading > 0 else columns - 1 - then[inside]]
+                digits, letters = np.split(total, [len(DIGITS)])
+                margin = digits.max(axis=0) - letters.max(axis=0)
+                at = int(margin.argmax())
+                best = max(best, (float(margin[at]), int(digits[:, at].argmax()), bool(end[at] >= columns)))
+        return best
+
+
+def _smeared(picture: Pictures, size: tuple[int, int], smear: int) -> Pictures:
+    """A plate of (columns, rows) pixels that moves by `smear` of them."""
+    small = cv2.resize(picture, size, interpolation=cv2.INTER_AREA)
+    return np.asarray(cv2.blur(small, (smear, 1), borderType=cv2.BORDER_REPLICATE), np.float32)
+
+
+def _evidence(picture: Pictures, variants: list[Pictures]) -> Floats:
+    """(columns,) of a character whose plate begins there."""
+    each = [cv2.matchTemplate(picture, one, cv2.TM_CCOEFF_NORMED).max(axis=0) for one in variants]
+    near = cv2.dilate(np.max(each, axis=0)[None], np.ones((1, 2 * TOLERANCE + 1), np.uint8))[0]
+    return np.asarray(-variants[0].size / 2 * np.log1p(-(np.clip(near, 0.0, 0.99) ** 2)), np.float64)
