@@ -6,9 +6,9 @@ from dataclasses import dataclass
 from typing import Any
 
 from scenes.mujoco import MujocoLight
+from scenes.mujoco.light import MOTION_PER_KEY
 from spikecam_env.envs.mujoco_tasks.balance import Balance
 from spikecam_env.envs.mujoco_tasks.dodge import Dodge
-from scenes.mujoco.light import MOTION_PER_KEY
 from spikecam_env.envs.mujoco_tasks.read import Read
 from spikecam_env.envs.mujoco_tasks.return_ball import Return
 from spikecam_env.envs.mujoco_tasks.task import EYE, MIDDLE_LEVEL, MujocoTask
