@@ -12,6 +12,7 @@ from PIL import Image
 from scenes.catalogue import SCENES
 from spikecam_env.cli.main import understood
 from spikecam_env.cli.scenes import FILM_FPS, Scenes
+from spikecam_env.envs.registration import MUJOCO_NAMES
 from spikecam_env.envs.tasks import TASKS
 from tools.films import documented
 from tools.site.films import as_directives, poster_of
@@ -21,7 +22,7 @@ FILMS = documented()
 
 
 def test_the_gallery_has_a_film_of_every_scene_and_of_every_task() -> None:
-    assert {film.stem for film in FILMS} == {*SCENES, *TASKS}
+    assert {film.stem for film in FILMS} == {*SCENES, *TASKS, *MUJOCO_NAMES}
 
 
 @pytest.mark.parametrize("film", FILMS, ids=lambda film: film.stem)
