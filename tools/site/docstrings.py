@@ -8,7 +8,19 @@ from __future__ import annotations
 
 import re
 
-TASK_SECTIONS = ("Scene", "Observation", "Action", "Encoders", "Reward", "End", "Success", "Reset", "Options", "Info", "Render")
+TASK_SECTIONS = (
+    "Scene",
+    "Observation",
+    "Action",
+    "Encoders",
+    "Reward",
+    "End",
+    "Success",
+    "Reset",
+    "Options",
+    "Info",
+    "Render",
+)
 HEADING = re.compile(r"[A-Z]\w+:$")
 CODE = re.compile(r"(`+)(.+?)\1", re.DOTALL)
 ONE_ENTRY = re.compile(rf"^({'|'.join((*TASK_SECTIONS, 'Returns', 'Yields'))}):\n +", re.MULTILINE)

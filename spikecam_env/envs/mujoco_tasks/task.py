@@ -173,7 +173,7 @@ class MujocoTask(OwnLength):
         }
         given = checked_options(options, rules)
         split = given.get("split", self.split)
-        self._number = drawn_number(self.np_random, split, given.get("episode"))
+        self._number = drawn_number(self.np_random, split, given)
         lowest, highest = self.levels
         drawn = int(self.np_random.integers(lowest, highest + 1))
         self.level = given.get("level", drawn)

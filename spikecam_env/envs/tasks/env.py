@@ -90,7 +90,7 @@ class TaskEnv(OwnLength, AimingEnv):
         rules: dict[str, Rule] = {"split": checked_split, "episode": lambda value, name: value}
         given = checked_options(options, rules)
         split = given.get("split", self.split)
-        number = drawn_number(rng, split, given.get("episode"))
+        number = drawn_number(rng, split, given)
         episode = self.task.draw(episode_generator(split, number, self.task.stream), self._view_of(split))
         return replace(episode, number=number)
 

@@ -5,6 +5,7 @@ Everything in an episode follows from its number.  Users count within a split, f
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -27,26 +28,27 @@ def checked_split(split: Any, name: str = "split") -> str:
     return split
 
 
-def drawn_number(rng: np.random.Generator, split: str, given: Any = None) -> int:
+def drawn_number(rng: np.random.Generator, split: str, options: Mapping[str, Any]) -> int:
     """The number, within its split, of the next episode.
 
     Args:
         rng: draws it; used alike where a number is given, so that all else stays the same.
         split: a name of EPISODES.
-        given: number that a user chose; None draws one.
+        options: of reset; `episode` is the number that a user chose.
 
     Raises:
         InputError: for a number that the split does not have.
 
     Example:
-        >>> drawn_number(np.random.default_rng(0), "test"), drawn_number(np.random.default_rng(0), "test", 3)
+        >>> rng = np.random.default_rng
+        >>> drawn_number(rng(0), "test", {}), drawn_number(rng(0), "test", {"episode": 3})
         (850, 3)
     """
     numbers = EPISODES[split]
     drawn = int(rng.integers(numbers.start, numbers.stop)) - numbers.start
-    if given is None:
+    if "episode" not in options:
         return drawn
-    last = len(numbers) - 1
+    given, last = options["episode"], len(numbers) - 1
     try:
         return checked_whole(given, "episode", 0, last)
     except InputError:
