@@ -14,6 +14,7 @@ import gymnasium
 from gymnasium.envs.registration import load_env_creator
 from gymnasium.wrappers import FrameStackObservation, ReshapeObservation
 
+from spikecam_env.agents.controllers import classical_policy
 from spikecam_env.agents.playing import episodes_of, judged, policy_of
 from spikecam_env.checked import checked_count, checked_seed
 from spikecam_env.envs.evaluation import Evaluation
@@ -23,6 +24,7 @@ from spikecam_env.errors import InputError, shown, unknown_name
 
 Env = gymnasium.Env[Any, Any]
 
+CLASSICAL = "classical"
 MOST_STACK = 1000
 """Pictures of an observation at most: those of a second."""
 
@@ -46,7 +48,8 @@ def evaluate(
 
     Args:
         policy: a callable, observation -> action; a model with `predict`, as of stable-baselines3, whose deterministic
-            actions are taken; an `Agent` or `Tracker`; or a name: "oracle", "nothing", "random", or a shipped agent's.
+            actions are taken; an `Agent` or `Tracker`; or a name: "oracle", "nothing", "random", "classical" (the
+            task's player without learning), or a shipped agent's.
         task: an id, with or without `spikecam_env/`, e.g. "Catch-v1", or a scene's, e.g. "Fan-v0".
         episodes: how many; by default 100 of Catch, 50 of Saccade and ReadSpin, 10 of others.
         seed: of the first episode.
@@ -72,7 +75,7 @@ def evaluate(
     """
     name = _known(task)
     episodes = episodes_of(name) if episodes is None else checked_count(episodes, "episodes")
-    act, sees = policy_of(policy)
+    act, sees = classical_policy(name) if policy == CLASSICAL else policy_of(policy)
     given = sees | ({} if obs is None else {"obs": obs}) | options
     if name not in ENVIRONMENTS:
         given["split"] = split

@@ -122,7 +122,7 @@ def draw_over(results: Sequence[Result], over: Over, path: Path) -> None:
     known = [result for result in results if over.value(result.case) is not None]
     series, problems = _in_order(_series(result.case) for result in known), _problems(known, over)
     tasks, rows = _in_order(task for task, *_ in problems), _in_order(tuple(further) for _, *further in problems)
-    figure = Figure(figsize=(4.4 * len(tasks), 3.0 * len(rows)), layout="constrained")
+    figure = Figure(figsize=(4.4 * len(tasks) + LEGEND_INCHES, 3.0 * len(rows)), layout="constrained")
     panels = figure.subplots(len(rows), len(tasks), squeeze=False)
     for row, (steps, other) in enumerate(rows):
         for column, task in enumerate(tasks):
@@ -134,12 +134,15 @@ def draw_over(results: Sequence[Result], over: Over, path: Path) -> None:
                     _draw_series(axes, own, over, name, f"C{number}")
             axes.axhline(0, color="0.8", linewidth=0.8, zorder=0)
             if axes.get_legend_handles_labels()[1]:
-                axes.legend(frameon=False, fontsize="small", title=LEGEND, title_fontsize="small")
+                place = {"loc": "center left", "bbox_to_anchor": (1.0, 0.5)} if column == len(tasks) - 1 else {}
+                axes.legend(frameon=False, fontsize="small", title=LEGEND, title_fontsize="small", **place)
     with whole_file(path) as beside:
         figure.savefig(beside, format="png", dpi=110)
 
 
 LEGEND = "sees, camera, processor time of training"
+LEGEND_INCHES = 2.6
+"""Width beside the last panel, for its legend: many cameras would hide curves [inches]."""
 
 
 def _draw_series(axes: Axes, own: Sequence[Result], over: Over, name: str, colour: str) -> None:

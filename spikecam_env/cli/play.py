@@ -46,8 +46,8 @@ class Play:
     id: tyro.conf.Positional[str]
     """Environment, with or without `spikecam_env/`, e.g. Track-v1, Catch-v1, Fan-v0 (docs/environments.md)."""
     policy: str | None = None
-    """Policy: keyboard, oracle, nothing, random, an agent's name or its file (.pt); default: keyboard in a window,
-    oracle in a film."""
+    """Policy: keyboard, oracle, nothing, random, classical, an agent's name or its file (.pt); default: keyboard in a
+    window, oracle in a film."""
     film: Path | None = None
     """Write a film (.mp4) of it instead of opening a window; default where there is no display: ID.mp4."""
     episodes: Annotated[int | None, WholeRange(1, MOST_EPISODES)] = None
@@ -86,7 +86,7 @@ class Play:
             raise InputError("--policy keyboard needs a window: run it where there is a display, without --film")
         check_place("film", film, ".mp4")
         held: set[str] = set()
-        acting = Player(steering(held)) if who == KEYBOARD else player(who)
+        acting = Player(steering(held)) if who == KEYBOARD else player(who, self.id)
         env = self._environment(acting)
         try:
             episodes = self.episodes or (None if film is None else 1)

@@ -49,7 +49,7 @@ class ViewCommand:
     denoise: bool = True
     """Show the online denoiser's picture (`best`) too."""
     policy: str = "oracle"
-    """Policy of an episode: oracle, nothing, random, an agent's name or its file (.pt)."""
+    """Policy of an episode: oracle, nothing, random, classical, an agent's name or its file (.pt)."""
     split: Literal["train", "test"] = "test"
     """Training or test episodes of a task of version 1."""
     seed: Seed = 0
@@ -99,7 +99,7 @@ class ViewCommand:
         if self.what in SCENES:
             yield self._scene()
         elif full_name(self.what) in ids:
-            acting = player(self.policy)
+            acting = player(self.policy, self.what)
             size = {} if self.size is None else {"shape": self.size}
             env = environment(self.what, acting, model=self.camera.load(), split=self.split, **size)
             try:

@@ -59,7 +59,9 @@ def test_an_agent_acts_on_what_it_was_trained_on_and_begins_each_episode(monkeyp
         return np.zeros(1, np.float32)
 
     policy = SimpleNamespace(recipe=SimpleNamespace(actions=1))
-    agent = SimpleNamespace(obs="tfi", act=act, begin=lambda: begun.append(len(seen)), policy=policy)
+    agent = SimpleNamespace(
+        obs="tfi", sees={"obs": "tfi", "obs_state": True}, act=act, begin=lambda: begun.append(len(seen)), policy=policy
+    )
     loaded: list[str] = []
     monkeypatch.setattr("spikecam_env.agents.agent.Agent.load", lambda name: loaded.append(name) or agent)
     line = ("play", "Catch-v1", "--policy", "mine.pt", "--episodes", 2, "--film", tmp_path / "a.mp4")
@@ -163,8 +165,8 @@ def test_an_episode_that_ends_is_counted_and_the_next_begins() -> None:
 
 
 def test_a_moment_is_of_the_step_it_says() -> None:
-    env = environment("Catch-v1", player("nothing"), split="test")
-    moments = list(episode(env, player("nothing"), 0))
+    env = environment("Catch-v1", player("nothing", "Catch-v1"), split="test")
+    moments = list(episode(env, player("nothing", "Track-v1"), 0))
     assert [m.step for m in moments] == list(range(len(moments)))
     assert [m.frame for m in moments] == [20 * (m.step + 1) for m in moments]
     assert moments[-1].over and not any(m.over for m in moments[:-1])
@@ -188,8 +190,8 @@ def test_pictures_are_the_share_of_the_last_frames_and_the_newest_plane() -> Non
 
 
 def test_the_target_is_marked_where_it_is_and_only_where_asked() -> None:
-    env = environment("Track-v1", player("nothing"), split="test")
-    moment = next(episode(env, player("nothing"), 0))
+    env = environment("Track-v1", player("nothing", "Track-v1"), split="test")
+    moment = next(episode(env, player("nothing", "Track-v1"), 0))
 
     def places(colour: tuple[int, int, int], **options: Any) -> np.ndarray:
         screen = EpisodeScreen("Track-v1", "nothing", **options)

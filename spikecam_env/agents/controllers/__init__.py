@@ -9,8 +9,13 @@ from __future__ import annotations
 from pkgutil import resolve_name
 from typing import Any
 
-from spikecam_env.agents.playing import Actor
+from numpy.typing import ArrayLike
+
+from spikecam_env.agents.agent import state_keywords
+from spikecam_env.agents.playing import Actor, acting
 from spikecam_env.agents.tracker import FINDERS
+from spikecam_env.envs.judged import JudgedEnv
+from spikecam_env.envs.score import Policy
 from spikecam_env.errors import unknown_name
 
 TRACKER = "spikecam_env.agents.tracker:Tracker"
@@ -44,3 +49,23 @@ def classical(env: Any) -> Actor:
         raise unknown_name("task of a classical controller", task, CONTROLLERS)
     actor: Actor = resolve_name(CONTROLLERS[task])(env)
     return actor
+
+
+def classical_policy(task: str) -> tuple[Policy, dict[str, Any]]:
+    """The classical player of a task, as `envs.score.play` takes it, and the keywords of its environment.
+
+    Args:
+        task: an id, with or without `spikecam_env/`.
+
+    Example:
+        >>> classical_policy("Return-v1")[1]
+        {'obs': 'tfp', 'obs_state': True, 'obs_inner': True}
+    """
+    of_env: list[Policy] = []
+
+    def act(observation: Any, env: JudgedEnv) -> ArrayLike:
+        if not of_env:
+            of_env.append(acting(classical(env)))
+        return of_env[0](observation, env)
+
+    return act, {"obs": "tfp", **state_keywords(task.removeprefix("spikecam_env/"))}

@@ -26,15 +26,20 @@ class Player:
     """Numbers of its action; None where it suits every environment."""
 
 
-def player(name: str) -> Player:
-    """A baseline or an agent, by its name or its file."""
+def player(name: str, task: str) -> Player:
+    """A baseline, the classical player of a task, or an agent, by its name or its file; task: an id."""
     if name in BASELINES:
         return Player(BASELINES[name])
+    if name == "classical":
+        from spikecam_env.agents.controllers import classical_policy
+
+        act, sees = classical_policy(task)
+        return Player(act, tuple(sees.items()))
     from spikecam_env.agents.agent import Agent, is_file, shipped
     from spikecam_env.agents.playing import acting
 
     if not is_file(name) and name not in shipped():
-        raise unknown_name("policy", name, (*BASELINES, *shipped()))
+        raise unknown_name("policy", name, (*BASELINES, "classical", *shipped()))
     agent = Agent.load(name)
     return Player(acting(agent), tuple(agent.sees.items()), agent.policy.recipe.actions)
 
