@@ -151,7 +151,7 @@ def shipped() -> list[str]:
 
     Example:
         >>> shipped()
-        ['Catch-v1', 'Exposure-v1', 'LowLight-v1', 'ReadSpin-v1', 'Saccade-v1', 'Track-v1']
+        ['Catch-v1', 'Exposure-v1', 'LowLight-v1', 'ReadSpin-v1', 'Return-v1', 'Saccade-v1', 'Track-v1']
     """
     return sorted(path.name[: -len(ENDING)] for path in _folder().glob(f"*{ENDING}"))
 

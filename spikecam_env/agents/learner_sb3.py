@@ -28,6 +28,8 @@ from spikecam_env.run_folder import run_folder
 from spikecam_env.torch_settings import torch_settings
 from spikecam_env.whole import whole_file, write_text_whole
 
+LEAST_SIDE = 36
+"""[pixels] Of the pictures that its usual network takes."""
 STACK = 4
 """Pictures that it sees together, as is usual with this network."""
 ENVIRONMENTS = 8
@@ -61,7 +63,8 @@ def train_sb3(study: Study, out: Path, steps: int, seed: int = 0) -> tuple[dict[
         The curve: a row with steps and cpu_s.
 
     Raises:
-        InputError: where stable-baselines3 is missing, or another run is at work in `out`.
+        InputError: where stable-baselines3 is missing, pictures are too small for its network, or another run is at
+            work in `out`.
 
     Example:
         >>> study = Study("Catch-v1", state=False)
@@ -80,6 +83,12 @@ def train_sb3(study: Study, out: Path, steps: int, seed: int = 0) -> tuple[dict[
             return tuple(json.loads((out / CURVE).read_text()))
         makers: list[Callable[[], gymnasium.Env[Any, Any]]] = [lambda: Monitor(stacked(study.make(), STACK))]
         with closing(DummyVecEnv(makers * ENVIRONMENTS)) as envs, torch_settings(threads=1, seed=seed):
+            shape = (envs.observation_space.shape or (0, 0, 0))[1:]
+            if min(shape) < LEAST_SIDE:
+                raise InputError(
+                    f"pictures are {shape[0]} x {shape[1]}; the usual network of stable-baselines3 takes "
+                    f"{LEAST_SIDE} x {LEAST_SIDE} or more: give a larger --size"
+                )
             each = min(SAMPLES, max(LEAST * ENVIRONMENTS, steps)) // ENVIRONMENTS
             model = PPO("CnnPolicy", envs, n_steps=each, seed=seed, device="cpu")
             began = time.process_time()

@@ -183,6 +183,7 @@ def test_the_tracker_is_as_good_as_the_oracle(task: str, episodes: int, obs: str
         ("LowLight-v1", 0.7, 1),
         ("Exposure-v1", 0.7, 1),
         ("ReadSpin-v1", 0.3, 10),
+        ("Return-v1", 0.1, 10),
     ],
 )
 def test_a_shipped_agent_does_its_task(task: str, least: float, episodes: int) -> None:

@@ -155,3 +155,10 @@ def test_an_episode_of_a_mujoco_task_becomes_a_film(tmp_path: Path, monkeypatch,
     assert command([*line, "--policy", "oracle"]) == 0 and (tmp_path / "return.mp4").stat().st_size > 1000
     assert "yes" in capsys.readouterr().out
     assert command([*line[:-2], "--policy", "keyboard"]) == 2 and "--policy oracle" in capsys.readouterr().err
+
+
+def test_pictures_that_stable_baselines_cannot_take_are_refused_in_one_line(tmp_path: Path) -> None:
+    pytest.importorskip("stable_baselines3", reason="needs stable-baselines3")
+    small = Study("Return-v1", options={"shape": (32, 32)}, state=False)
+    with pytest.raises(InputError, match="36 x 36 or more"):
+        learner_sb3.train_sb3(small, tmp_path / "sb3", steps=64)
