@@ -14,6 +14,7 @@ from in_browser import BROWSER, laid_out
 
 from scenes.catalogue import SCENES
 from spikecam_env import __version__
+from spikecam_env.envs.registration import MUJOCO_NAMES
 from spikecam_env.envs.tasks import TASKS
 from tools.page_blocks import ROOT
 from tools.site.public import MODULES, home_of, kind_of, names_of
@@ -67,7 +68,7 @@ def test_no_code_is_cut_no_page_is_wider_than_the_screen_and_films_play(site: Pa
     assert not [(page.page, page.page_width) for page in laid if page.page_width > page.width]
     assert not [(page.page, page.still) for page in desk if page.still]
     films = {page.page: page.films for page in desk}
-    assert films["gallery.html"] == len(SCENES) + len(TASKS)
+    assert films["gallery.html"] == len(SCENES) + len(TASKS) + len(MUJOCO_NAMES)
     assert all(films[f"tasks/{kind.__module__.rpartition('.')[2]}.html"] == 1 for kind in TASKS.values())
     highlighted = [page for page in desk if page.page.startswith(("tutorials/", "howto/")) and page.blocks]
     assert all(page.copied == page.blocks for page in highlighted)
