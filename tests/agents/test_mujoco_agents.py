@@ -112,6 +112,7 @@ def measured_again(*_: object, **__: object) -> None:
 
 
 @pytest.mark.slow
+@pytest.mark.slow
 def test_a_study_over_levels_writes_its_table_and_picture_and_goes_on(tmp_path: Path, capsys, monkeypatch) -> None:
     line = ["evaluate", "agents", "--tasks", "Return-v1", "--observations", "tfp", "oracle", "--levels", "4", "5"]
     line += ["--trained-levels", "4", "5", "--seeds", "1", "--steps", "64", "--episodes", "1", "--points", "0"]

@@ -12,7 +12,6 @@ pytest.importorskip("mujoco", reason="the extra mujoco is not installed: pip ins
 
 import spikecam_env.envs  # noqa: F401
 from scenes.mujoco import MujocoLight
-from spikecam_env.agents.controllers.return_ball import ReturnController
 from spikecam_env.envs.mujoco_tasks import make_task
 from spikecam_env.envs.mujoco_tasks.return_ball import AWAY, BEND, CAN, LEVEL, REACH, Return
 from spikecam_env.envs.mujoco_tasks.task import EYE, STEP_S
@@ -121,20 +120,3 @@ def test_a_faster_level_is_darker_and_fuller() -> None:
         means[level] = picture.mean()
     env.close()
     assert means[1] > 2 * means[3] > 4 * means[5] > 0
-
-
-def test_the_classical_controller_returns_slow_balls_from_pictures() -> None:
-    env = make_task("Return", level=1, split="test", obs_state=True, obs_inner=True)
-    task = env.unwrapped
-    assert isinstance(task, Return)
-    player, won = ReturnController(task), []
-    for seed in range(4):
-        seen, _ = env.reset(seed=seed)
-        player.begin()
-        over = False
-        while not over:
-            seen, _, terminated, truncated, info = env.step(player.act(seen))
-            over = terminated or truncated
-        won.append(info["is_success"])
-    env.close()
-    assert sum(won) >= 2
