@@ -23,6 +23,14 @@ SUPERSAMPLE = 2
 samples, at 1.9 times the steps a second (`python -m benchmarks.mujoco_light`)."""
 
 
+OWN_KEYWORDS = ("level", "split", "shape", "render_mode", "supersample")
+CAMERA_KEYWORDS = (
+    *("obs", "obs_state", "obs_inner", "model", "block_frames"),
+    *("scale", "mean_interval", "engine", "threads", "motion_per_key"),
+)
+"""Keywords of `make_task`; the latter go to `SpikeCamera`, and the last to the light."""
+
+
 @dataclass(frozen=True)
 class EyeLight:
     """Makes the light that falls into a task's camera; a value, so that Gymnasium can compare specifications."""
@@ -69,6 +77,9 @@ def make_task(
     """
     if task not in MUJOCO_TASKS:
         raise unknown_name("task", task, MUJOCO_TASKS)
+    for name in camera:
+        if name not in CAMERA_KEYWORDS:
+            raise unknown_name("keyword", name, (*OWN_KEYWORDS, *CAMERA_KEYWORDS))
     inner = MUJOCO_TASKS[task](level=level, split=split, shape=shape, render_mode=render_mode)
     given = {"motion_per_key": MOTION_PER_KEY, **inner.camera_defaults, **camera}
     light = EyeLight(supersample, given.pop("motion_per_key"))

@@ -99,6 +99,8 @@ def test_a_vector_plays_on_when_episodes_end(name: str) -> None:
         ({"render_mode": "human"}, "render_mode"),
         ({"supersample": 99}, "supersample"),
         ({"obs": "video"}, "video"),
+        ({"levl": 3}, "(level?)"),
+        ({"frames_per_step": 20}, "block_frames"),
         ({"task": "Retrun"}, "Return?"),
     ],
     ids=str,
