@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from spikecam_env.envs.mujoco_tasks.servo import Servo
-from spikecam_env.envs.mujoco_tasks.task import STEP_S, MujocoTask, Verdict
+from spikecam_env.envs.mujoco_tasks.task import BOUNCE, STEP_S, MujocoTask, Verdict
 from spikecam_env.types import Floats
 
 RADIUS, MASS = 0.0213, 0.0459
@@ -132,7 +132,6 @@ class Dodge(MujocoTask):
             for n in range(THREATS + DECOYS)
         )
         through = 'contype="0" conaffinity="0"'
-        bounce = 'solref="-2.5e6 -160" solimp=".99 .99 .001"'  # stiffness and damping: contact of 2 ms
         return f"""<mujoco model="dodge">
 <option timestep="0.0005" integrator="Euler" gravity="0 0 0"/>
 <visual><quality shadowsize="0" numslices="16" numstacks="8"/><map znear=".01" zfar="20"/>
@@ -145,7 +144,7 @@ class Dodge(MujocoTask):
 <geom type="box" size=".4 1.2 .01" pos="{ROOF + 0.4} 0 .05" rgba=".3 .3 .32 1" {through}/>
 <body name="puck"><joint type="slide" axis="1 0 0"/><joint type="slide" axis="0 1 0"/>
 <geom type="cylinder" size="{PUCK} .03" mass="{CAN.mass}" rgba=".9 .45 .1 1" contype="0" conaffinity="1"
- priority="1" condim="1" {bounce}/></body>
+ priority="1" condim="1" {BOUNCE}/></body>
 {balls}</worldbody>
 </mujoco>"""
 
@@ -154,7 +153,6 @@ class Dodge(MujocoTask):
         self._throws = drawn_throws(rng, LEVEL[level])
         self._velocity = np.zeros((len(self._throws.step), 2))
         self._balls()[:] = np.stack([np.full(len(self._velocity), HATCH), self._throws.start], axis=1)
-        self.data.xfrc_applied[:] = 0.0
         self._hit = False
         return LEVEL[level].brightness
 

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from spikecam_env.envs.mujoco_tasks.servo import Servo
-from spikecam_env.envs.mujoco_tasks.task import STEP_S, MujocoTask, Verdict
+from spikecam_env.envs.mujoco_tasks.task import BOUNCE, STEP_S, MujocoTask, Verdict
 from spikecam_env.types import Floats
 
 AWAY = 1.5
@@ -105,8 +105,6 @@ class Return(MujocoTask):
                 (0.009, HALF, -HALF, 0),
             )
         )
-        # stiffness and damping: contact of 2 ms, of which the ball keeps 0.85 of its speed
-        bounce = 'solref="-2.5e6 -160" solimp=".99 .99 .001"'
         return f"""<mujoco model="return">
 <option timestep="0.00025" integrator="Euler"/><visual><quality shadowsize="0"/><map znear=".01" zfar="20"/>
 <headlight ambient=".45 .45 .45" diffuse=".3 .3 .3" specular="0 0 0"/></visual>
@@ -120,19 +118,18 @@ class Return(MujocoTask):
 <geom type="box" size=".7 {TABLE_HALF} .01" pos=".8 0 -.38" material="table" {through}/>
 <geom type="box" size=".005 {TABLE_HALF} {(NET_TOP + 0.38) / 2}" pos="{NET} 0 {(NET_TOP - 0.38) / 2}"
  rgba=".35 .35 .35 1" {through}/>
-<body name="ball" pos="{AWAY} 0 0"><freejoint name="ball"/>{ball} {bounce}/></body>
+<body name="ball" pos="{AWAY} 0 0"><freejoint name="ball"/>{ball} {BOUNCE}/></body>
 {decoys}
 <body name="paddle" gravcomp="1"><inertial pos="0 0 0" mass="{CAN.mass}" diaginertia="1e-3 1e-3 1e-3"/>
 <joint name="across" type="slide" axis="0 1 0"/><joint name="up" type="slide" axis="0 0 1"/>
 <geom name="face" type="box" size=".01 {HALF} {HALF}" euler="0 {-TILT_DEGREES} 0" group="3" mass="0" condim="1"
- {bounce}/>
+ {BOUNCE}/>
 {bars}</body></worldbody>
 <actuator><motor joint="across"/><motor joint="up"/></actuator></mujoco>"""
 
     def arrange(self, rng: np.random.Generator, level: int) -> float:
         """See `MujocoTask.arrange`."""
         numbers = LEVEL[level]
-        self.data.xfrc_applied[:] = 0.0
         self._crossing = beside_paddle(rng)
         self._throw("ball", rng, numbers.speed, self._crossing)
         for n in range(DECOYS):

@@ -18,6 +18,7 @@ from gymnasium import spaces
 from numpy.typing import ArrayLike, NDArray
 
 from scenes.mujoco import MujocoPictures, import_mujoco
+from scenes.mujoco.cameras import Projection
 from spikecam_env.checked import checked_shape, checked_whole
 from spikecam_env.envs.action import checked_action
 from spikecam_env.envs.own_length import OwnLength
@@ -33,6 +34,8 @@ LEVELS = (1, 2, 3, 4, 5)
 MIDDLE_LEVEL = 3
 EYE = "eye"
 """Name of the camera in every model."""
+BOUNCE = 'solref="-2.5e6 -160" solimp=".99 .99 .001"'
+"""Stiffness [1/s^2] and damping [1/s] of a hard contact (MJCF): it lasts 2 ms, and a ball keeps 0.85 of its speed."""
 RENDERED_SIDE = 256
 """Longer side of a picture for people [pixels]."""
 
@@ -112,6 +115,7 @@ class MujocoTask(OwnLength):
         self.action_space = spaces.Box(-1.0, 1.0, (self.actions,), np.float32)
         self.observation_space = spaces.Box(-np.inf, np.inf, (self.sensed_numbers,), np.float32)
         self._pictures: MujocoPictures | None = None
+        self._twin: MujocoTask | None = None  # that plays episodes without a camera
         self._verdict: Verdict | None = None
         self._steps = 0
         self.level, self._number = self.levels[0], 0
@@ -203,9 +207,9 @@ class MujocoTask(OwnLength):
 
     def ends_of(self, seed: int, most: int | None = None) -> tuple[float, float]:
         """See `JudgedEnv.ends_of`."""
-        levels = self.levels
-        other = type(self)(level=levels, split=self.split, shape=self.shape)
-        still = np.zeros(self.actions, np.float32)
+        if self._twin is None:
+            self._twin = type(self)(level=self.levels, split=self.split, shape=self.shape)
+        other, still = self._twin, np.zeros(self.actions, np.float32)
         nothing, best = (other.played(seed, act, most) for act in (lambda: still, other.best_action))
         return nothing, best
 
@@ -244,13 +248,13 @@ class MujocoTask(OwnLength):
 
     def places(self, points: Floats) -> Floats:
         """(..., 2) x, y [pixels] at which points (..., 3) of the world are seen."""
-        camera = self.model.camera(EYE).id
-        turn = self.data.cam_xmat[camera].reshape(3, 3)
-        right, up, back = ((points - self.data.cam_xpos[camera]) @ turn[:, axis] for axis in range(3))
-        rows, columns = self.shape
-        scale = rows / 2 / np.tan(np.radians(self.model.cam_fovy[camera]) / 2)
-        away = np.maximum(-back, 1e-6)
-        return np.stack([(columns - 1) / 2 + scale * right / away, (rows - 1) / 2 - scale * up / away], axis=-1)
+        camera, (rows, columns) = self.model.camera(EYE).id, self.shape
+        right, up, back = self.data.cam_xmat[camera].reshape(3, 3).T
+        scale = np.full(2, rows / 2 / np.tan(np.radians(self.model.cam_fovy[camera]) / 2))
+        centre = np.array([columns - 1, rows - 1]) / 2
+        axes = np.stack([right, up, -back])
+        lens = Projection(self.data.cam_xpos[camera], axes, scale, centre, near=1e-6, far=np.inf, orthographic=False)
+        return lens.places(lens.in_camera(points))
 
     def _begun(self) -> Verdict:
         if self._verdict is None:
