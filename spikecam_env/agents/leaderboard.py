@@ -15,7 +15,7 @@ from pydantic import Field
 
 from spikecam_env.agents.over import mean_of_seeds
 from spikecam_env.agents.playing import episodes_of
-from spikecam_env.agents.study import Level, Result, mean_known
+from spikecam_env.agents.study import Level, Result, by_cell, mean_known
 from spikecam_env.untrusted import Count, Declared, Name, Seed, Whole, declared, read_json
 from spikecam_env.version import __version__
 
@@ -69,9 +69,6 @@ def entry_of(results: Sequence[Result], name: str, command: str) -> Entry:
         >>> entry_of(runs, "mine", "spikecam evaluate agents --out study").rows[0].frames
         2560
     """
-    cells: dict[Any, list[Result]] = {}
-    for result in results:
-        cells.setdefault(result.case.cell, []).append(result)
     rows = [
         EntryRow(
             task=cell.task,
@@ -85,7 +82,7 @@ def entry_of(results: Sequence[Result], name: str, command: str) -> Entry:
             successes=tuple(result.success for result in its),
             camera_bits_s=mean_known(result.camera_bits_s for result in its),
         )
-        for cell, its in cells.items()
+        for cell, its in by_cell(results).items()
     ]
     return Entry(name=name, version=__version__, command=command, rows=tuple(rows))
 

@@ -371,12 +371,23 @@ def read_record(path: Path) -> list[Result]:
     return [declared(Result, parse_json(line, f"{path} line {n}"), f"{path} line {n}") for n, line in lines]
 
 
-def summary(results: Sequence[Result]) -> list[dict[str, Any]]:
-    """A row a cell: mean score, its standard deviation over seeds, how many there are, processor minutes a seed."""
+def by_cell(results: Iterable[Result]) -> dict[StudyRun, list[Result]]:
+    """The results of every cell, one a seed.
+
+    Example:
+        >>> runs = [Result(case=StudyRun(task="Catch-v1", sight="tfp", seed=seed), score=0.5) for seed in (0, 1)]
+        >>> [len(its) for its in by_cell(runs).values()]
+        [2]
+    """
     cells: dict[StudyRun, list[Result]] = {}
     for result in results:
         cells.setdefault(result.case.cell, []).append(result)
-    rows = [_row(cell, of_seeds) for cell, of_seeds in cells.items()]
+    return cells
+
+
+def summary(results: Sequence[Result]) -> list[dict[str, Any]]:
+    """A row a cell: mean score, its standard deviation over seeds, how many there are, processor minutes a seed."""
+    rows = [_row(cell, of_seeds) for cell, of_seeds in by_cell(results).items()]
     empty = {name for name in WHERE_KNOWN if all(row[name] is None for row in rows)}
     return [{name: value for name, value in row.items() if name not in empty} for row in rows]
 

@@ -20,7 +20,7 @@ MUJOCO_TASKS: dict[str, type[MujocoTask]] = {"Return": Return, "Dodge": Dodge, "
 """By name."""
 SUPERSAMPLE = 2
 """Samples a pixel and axis: light of moving edges is then 1.9 % rms from that of eight times as many keys and 4 x 4
-samples, at 1.9 times the steps a second (`python -m benchmarks.mujoco_light`)."""
+samples, at 1.2 to 1.9 times the steps a second (`python -m benchmarks.mujoco_light`)."""
 
 
 OWN_KEYWORDS = ("level", "split", "shape", "render_mode", "supersample")
