@@ -18,6 +18,7 @@ from spikecam_env.agents.controllers import classical_policy
 from spikecam_env.agents.playing import episodes_of, judged, policy_of
 from spikecam_env.checked import checked_count, checked_seed
 from spikecam_env.envs.evaluation import Evaluation
+from spikecam_env.envs.judged import is_judged
 from spikecam_env.envs.observations import Observation
 from spikecam_env.envs.registration import ALL_TASKS, ENVIRONMENTS, register
 from spikecam_env.errors import InputError, shown, unknown_name
@@ -131,7 +132,7 @@ def _check_kind(name: str) -> None:
     """Raise InputError for an id of other people's, whose episodes have no oracle and no performance."""
     entry = gymnasium.spec(name).entry_point
     kind = load_env_creator(entry) if isinstance(entry, str) else entry
-    if isinstance(kind, type) and not hasattr(kind, "best_action"):
+    if isinstance(kind, type) and not is_judged(kind):
         raise InputError(f"{name} makes a {kind.__name__}, which has no oracle; give an id of a task or a scene")
 
 

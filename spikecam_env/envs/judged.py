@@ -39,3 +39,14 @@ class JudgedEnv(Protocol):
             (of doing nothing, of the oracle).
         """
         ...
+
+
+def is_judged(kind: type) -> bool:
+    """Whether a class is a `JudgedEnv`; nothing of an environment is called, which may not have begun.
+
+    Example:
+        >>> from spikecam_env.envs.tasks.env import TaskEnv
+        >>> is_judged(TaskEnv), is_judged(object)
+        (True, False)
+    """
+    return hasattr(kind, "best_action")

@@ -19,7 +19,7 @@ from numpy.typing import ArrayLike
 from tqdm import tqdm
 
 from spikecam_env.envs.action import checked_action
-from spikecam_env.envs.judged import JudgedEnv
+from spikecam_env.envs.judged import JudgedEnv, is_judged
 from spikecam_env.errors import InputError
 
 Policy = Callable[[Any, JudgedEnv], ArrayLike]
@@ -103,7 +103,7 @@ def judged_env(env: gymnasium.Env[Any, Any]) -> Any:
         InputError: for an environment whose episodes have no performance.
     """
     inner = env.unwrapped
-    if not hasattr(type(inner), "best_action"):
+    if not is_judged(type(inner)):
         raise InputError(f"{type(inner).__name__} has no performance and no oracle; give an id of this package")
     return inner
 
