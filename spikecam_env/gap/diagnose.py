@@ -48,7 +48,7 @@ from spikecam_env.gap.unit.label_unit import in_nominal_units, label_unit_note, 
 from spikecam_env.gap.verdict.bounds import bounds as upper_bounds
 from spikecam_env.gap.verdict.comparison import Comparison, aligned_mean
 from spikecam_env.gap.verdict.moving import moves, static_note
-from spikecam_env.gap.verdict.verdict import conclude, with_given_parameters, with_stand_ins
+from spikecam_env.gap.verdict.verdict import conclude, up_to_named, with_given_parameters
 from spikecam_env.numbers import Range
 from spikecam_env.sensor import SensorModel
 from spikecam_env.sensor.own_effects import files_of
@@ -175,7 +175,7 @@ def of_spikes(
         with stages.timed("candidates"):
             problem = Problem.of(case, comparison.model, null, values)
             rounds = forward_selection(problem, comparison.names, templates)
-            rounds = with_stand_ins(case, null, values, rounds)
+            rounds = up_to_named(case, null, values, rounds)
             rounds = rounds if comparison.missing else with_given_parameters(problem, tested, rounds)
     with stages.timed("verdict"):
         conclusion = conclude(comparison, rounds, floor_of_halves(case, measured.recordings, null))

@@ -24,6 +24,11 @@ from spikecam_env.whole import whole_folder, write_text_whole
 DIAGNOSIS_FORMAT = "spikecam-diagnosis/1"
 VERDICTS = ("none", "named", "class", "unknown", "parameter", "data")
 
+EXPLAINS_ALL, EXPLAINS_NEARLY_ALL, LARGEST = "explains all", "explains nearly all", "largest of several"
+UNKNOWN = "unknown"
+DEGREES = (EXPLAINS_ALL, EXPLAINS_NEARLY_ALL, LARGEST, UNKNOWN)
+"""How much of a difference is explained (`verdict.degree`), from most to least."""
+
 
 @dataclass(frozen=True)
 class Estimate:
@@ -70,7 +75,7 @@ class NamedEffect:
 
 @dataclass(frozen=True)
 class Remainder:
-    """The rest beyond chance beside named effects, where their law differs from the catalogue's."""
+    """The rest beyond chance beside named effects: a law that differs from the catalogue's, or another effect."""
 
     noises: float
     """Largest deviate left."""
@@ -82,6 +87,10 @@ class Remainder:
     """Share of each group of statistics, largest first."""
     recordings: tuple[str, ...]
     """Those of statistics left off, the worst first."""
+    light: tuple[str, ...] = ()
+    """Kinds of light of these recordings, in words."""
+    looks: tuple[str, ...] = ()
+    """Its extent, and marks of a mechanism, in words."""
     where: str = ""
     """As of `NamedEffect`."""
     when: str = ""
@@ -230,8 +239,12 @@ class Conclusion:
 
     verdict: str
     """One of `VERDICTS`."""
+    degree: str | None = None
+    """How much the named effects explain, one of `DEGREES`; None where no effect is missing, and for verdict `data`."""
     effects: tuple[NamedEffect, ...] = ()
     """Named effects."""
+    stand_ins: tuple[str, ...] = ()
+    """Names of effects of `patched` that make the gap smaller and are not shown to be right."""
     unknown: dict[str, Any] | None = None
     """For verdict `unknown`, the structure of the difference."""
     class_: dict[str, Any] | None = None
@@ -321,8 +334,10 @@ class Diagnosis(Findings):
         return {
             "format": DIAGNOSIS_FORMAT,
             "verdict": self.verdict,
+            "degree": self.degree,
             "sentence": self.sentence,
             "effects": [e.to_json() for e in self.effects],
+            "stand_ins": list(self.stand_ins),
             "unknown": self.unknown,
             "class": self.class_,
             "remainder": asdict(self.remainder) if self.remainder else None,

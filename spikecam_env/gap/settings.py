@@ -239,12 +239,19 @@ class Concluding:
     """The remainder that a name may leave."""
 
     most_left: float = setting(
-        0.05, "of the deviance beyond chance", "A name may leave so much in all.", TUNED, most=1.0
+        0.05, "of the squares beyond chance", "Effects that explain nearly all leave so much at most.", TUNED, most=1.0
     )
-    most_left_there: float = setting(
-        0.25,
-        "of the sum of squares",
-        "A name may leave so much in a group of statistics of a recording.",
+    least_margin: float = setting(
+        0.5,
+        "of the misfit removed",
+        "Least share of what a right name removes that no other candidate removes.",
+        TUNED,
+        most=1.0,
+    )
+    most_missed: float = setting(
+        0.1,
+        "of the squares of the change",
+        "Right names leave so much at most in the places that they change.",
         TUNED,
         most=1.0,
     )

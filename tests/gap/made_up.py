@@ -9,7 +9,20 @@ import numpy as np
 
 from spikecam_env.gap.observe.conditions import Condition
 from spikecam_env.gap.observe.observation import ObservedRecording, observe
-from spikecam_env.gap.result import Bound, Diagnosis, Estimate, Evidence, Gap, NamedEffect, Ranked, Remainder, Statistic
+from spikecam_env.gap.result import (
+    EXPLAINS_ALL,
+    EXPLAINS_NEARLY_ALL,
+    LARGEST,
+    Bound,
+    Diagnosis,
+    Estimate,
+    Evidence,
+    Gap,
+    NamedEffect,
+    Ranked,
+    Remainder,
+    Statistic,
+)
 from spikecam_env.gap.twins.fresh_units import drawn_response
 from spikecam_env.gap.unit.refit import free_refit
 from spikecam_env.gap.verdict.named_effects import estimates
@@ -165,17 +178,29 @@ def named(effect: str = "photodiode_lag", only: tuple[str, ...] = ()) -> Diagnos
         CATALOGUE[effect](**{k: v.value for k, v in found.items()})
     )
     return _plain(
-        "named", words[effect], effects=(e,), gap=gap(41.0, 2.2), statistics=statistics(loud),
+        "named", words[effect], degree=EXPLAINS_ALL, effects=(e,), gap=gap(41.0, 2.2), statistics=statistics(loud),
         ranking=_ranking(effect, found), patched=model, evidence=evidence(effect, only=only),
     )  # fmt: skip
 
 
 def with_remainder() -> Diagnosis:
     """One effect found, whose law differs in details from the catalogue's."""
-    left = Remainder(8.1, 0.0042, "step: up 16-32", {"step": 0.86, "moving": 0.14}, ("step", "bars"))
+    left = Remainder(
+        8.1, 0.0042, "step: up 16-32", {"step": 0.86, "moving": 0.14}, ("step", "bars"),
+        ("the step of light", "moving light"), ("pixel by pixel", "a memory of earlier light"),
+    )  # fmt: skip
     d = named()
     words = "Its law differs in details from the catalogue's: 0.4 % of the sum of squares is left."
-    return replace(d, remainder=left, sentence=f"{d.sentence} {words}")
+    return replace(d, degree=EXPLAINS_NEARLY_ALL, remainder=left, sentence=f"{d.sentence} {words}")
+
+
+def largest() -> Diagnosis:
+    """One effect found, and something else beside it."""
+    left = Remainder(
+        40.2, 0.16, "rows: k1", {"rows": 0.9, "noise": 0.1}, ("flat-050",), ("the dim flats",),
+        ("common to many pixels", "a coupling of neighbours"),
+    )  # fmt: skip
+    return replace(named(), degree=LARGEST, remainder=left, stand_ins=("crosstalk",))
 
 
 def none() -> Diagnosis:

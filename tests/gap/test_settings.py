@@ -11,6 +11,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from made_up import named
+from made_up_search import explained
 from scipy import stats
 from small import MODEL, unit
 
@@ -27,7 +28,6 @@ from spikecam_env.gap.screen.screen import Screened
 from spikecam_env.gap.search import shortlist
 from spikecam_env.gap.settings import CONSTANTS, Deviance, DiagnosisSettings, every_setting
 from spikecam_env.gap.statistics import StatisticKey
-from spikecam_env.gap.verdict.remainder import explains
 from spikecam_env.gap.verdict.verdict import may_be_chance
 
 
@@ -99,12 +99,19 @@ def dark_is_off(settings: DiagnosisSettings, factor: float) -> bool:
     return "dark_current" in off_nominal(case, MODEL, replace(unit(), dark=factor * unit().dark)).parameters
 
 
-def explained(settings: DiagnosisSettings, share: float) -> bool:
-    """Whether a name explains a hundred statistics, and of another place all but a share of the squares."""
-    keys = (*(StatisticKey("rates", "a", str(n)) for n in range(100)), StatisticKey("drift", "b", "0"))
-    null, before = known(settings, keys), np.r_[np.full(100, 1000.0), 60.0]
-    mean = np.r_[np.full(100, 1000.0), 60.0 - 60.0 * np.sqrt(share)]
-    return explains(null, before, replace(null.prediction, mean=mean))
+def degree(settings: DiagnosisSettings, elsewhere: float = 1e-4, missed: float = 1e-4, margin: float = 0.9) -> str:
+    """The degree to which an effect explains a hundred statistics.
+
+    Args:
+        elsewhere: share of all squares that is in a statistic of another place.
+        missed: share of the squares of the effect's change that is left in a statistic of its own place.
+        margin: of the name.
+    """
+    keys = (*(StatisticKey("rates", "a", str(n)) for n in range(101)), StatisticKey("drift", "b", "0"))
+    null, change = known(settings, keys), np.r_[np.full(100, 1000.0), 0.0, 0.0]
+    squares = float(np.sum(change**2))
+    seen = change + np.r_[np.zeros(100), np.sqrt(missed * squares), np.sqrt(elsewhere / (1.0 - elsewhere) * squares)]
+    return explained(null, seen, change, margin=margin).degree
 
 
 DECISIONS = {
@@ -114,7 +121,9 @@ DECISIONS = {
     "baseline.false_alarm": (1.0, lambda s, _: round(motion.least_deviate(1000, s.baseline), 6)),
     "unit.usual": (1.8, dark_is_off),
     "searching.most_fitted": (1.0, lambda s, _: names_of_fitted(s)),
-    "concluding.most_left_there": (0.25, explained),
+    "concluding.most_left": (0.05, lambda s, share: degree(s, elsewhere=share)),
+    "concluding.most_missed": (0.1, lambda s, share: degree(s, missed=share)),
+    "concluding.least_margin": (0.5, lambda s, margin: degree(s, margin=margin)),
 }
 """By setting: its default, or 1, and a decision by the settings on a number a little below and above it."""
 

@@ -22,7 +22,10 @@ from spikecam_env.gap.maps.search import (
     fitted_parameters,
 )
 from spikecam_env.gap.result import (
+    EXPLAINS_ALL,
+    EXPLAINS_NEARLY_ALL,
     MOST_CONFIDENCE,
+    UNKNOWN,
     Conclusion,
     Estimate,
     Gap,
@@ -73,8 +76,11 @@ def conclude_maps(
     parameters = spreads_off(case, last.state) if last else {}
     effects = significant_effects(case, null, values, rounds)
     by_effects = "named" if effects else "parameter" if parameters else "none"
+    verdict = by_effects if explained else "unknown"
+    beside = EXPLAINS_NEARLY_ALL if is_left else EXPLAINS_ALL
     return Conclusion(
-        verdict=by_effects if explained else "unknown",
+        verdict=verdict,
+        degree={"named": beside, "unknown": UNKNOWN}.get(verdict),
         effects=effects if explained else (),
         unknown=None if explained else maps_structure(null, rho, left, [e.name for e in effects]),
         class_=None,

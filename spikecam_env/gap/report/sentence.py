@@ -3,12 +3,22 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
+from typing import Any
 
 from spikecam_env.gap.report.parameters_off import parameters_off
 from spikecam_env.gap.report.quantities import percent, plain_sizes, rough, three_digits
 from spikecam_env.gap.report.words import human, listed
-from spikecam_env.gap.result import BOUNDED_VERDICTS, CHANCE, Conclusion, Diagnosis, Gap, Remainder
+from spikecam_env.gap.result import (
+    BOUNDED_VERDICTS,
+    CHANCE,
+    EXPLAINS_ALL,
+    LARGEST,
+    Conclusion,
+    Diagnosis,
+    Gap,
+    Remainder,
+)
 from spikecam_env.gap.twins.budget import Budget
 from spikecam_env.gap.verdict.notes import gap_is_fitted
 
@@ -27,20 +37,36 @@ def none_sentence(conclusion: Conclusion, model_name: str) -> str:
 
 
 def named_sentence(conclusion: Conclusion, model_name: str) -> str:
-    """Effects with their sizes."""
+    """Effects with their sizes, and the degree to which they explain the difference."""
     named = [f"{human(e.name)} ({plain_sizes(e)})" if e.parameters else human(e.name) for e in conclusion.effects]
     said = f"Your camera has {listed(named, 'and')}{removed_phrase(conclusion, 'it' if len(named) == 1 else 'them')}."
-    return f"{said} {remainder_sentence(conclusion.remainder, len(named))}" if conclusion.remainder else said
+    return f"{said} {degree_sentence(conclusion, len(named))}"
 
 
-def remainder_sentence(left: Remainder, names: int) -> str:
-    """The remainder beside the named effects."""
-    whose = "Its law differs" if names == 1 else "Their laws differ"
+def degree_sentence(conclusion: Conclusion, names: int) -> str:
+    """The degree to which named effects explain the difference, and the remainder."""
+    it, verb, its = ("It", "explains", "its law differs") if names == 1 else ("They", "explain", "their laws differ")
+    if conclusion.degree == EXPLAINS_ALL:
+        return f"{it} {verb} all of the difference: chance is left."
+    left = conclusion.remainder
+    if left is None:
+        return f"{it} {verb} nearly all of the difference."
+    if conclusion.degree == LARGEST:
+        largest = "is the largest" if names == 1 else "are the largest"
+        stand_ins = listed([human(name) for name in conclusion.stand_ins], "and")
+        beside = f" The patched model has {stand_ins} too, in place of something unknown." if stand_ins else ""
+        return f"{it} {largest} of several effects; something else is there.{beside} {left_sentence(left)}"
+    return f"{it} {verb} nearly all; {its} in detail from the catalogue's. {left_sentence(left)}"
+
+
+def left_sentence(left: Remainder) -> str:
+    """The place and the look of a remainder."""
     groups = listed([human(group) for group in list(left.groups)[:MOST_GROUPS]], "and")
-    return (
-        f"{whose} in details from the catalogue's: {percent(left.share)} of the sum of squares is left, "
-        f"{left.noises:.1f} noises at most, in {groups}."
-    )
+    light = f" of {listed(left.light, 'and')}" if left.light else ""
+    looks = f": {left.looks[0]}" if left.looks else ""
+    marks = f", with {listed(left.looks[1:], 'and')}" if left.looks[1:] else ""
+    size = f"{percent(left.share)} of the squares and {left.noises:.1f} noises at most"
+    return f"What is left, {size}, is in {groups}{light}{looks}{marks}."
 
 
 def class_sentence(conclusion: Conclusion, model_name: str) -> str:
@@ -56,13 +82,21 @@ def unknown_sentence(conclusion: Conclusion, model_name: str) -> str:
     """A gap that no candidate closes, or no single one where a second effect was not searched for."""
     patch = removed_phrase(conclusion, "an empirical patch")
     about = conclusion.unknown or {}
+    best = nearest_phrase(about)
     if "not_looked_for" not in about:
-        return f"Your camera does something that no candidate explains{patch}."
-    best = f"; {human(about['best_candidate'])} comes nearest" if about["best_candidate"] else ""
+        return f"Your camera does something that no candidate explains{best}{patch}."
     return (
         f"Your camera does something that no single candidate explains{best}{patch}. "
         f"{about['not_looked_for'].capitalize()} was not searched for: --effort {about['effort']} includes it."
     )
+
+
+def nearest_phrase(unknown: Mapping[str, Any]) -> str:
+    """The candidate that comes nearest, and the reason why it is not named; empty where none comes near."""
+    if not unknown.get("best_candidate"):
+        return ""
+    fault = f", but {unknown['not_named']}" if unknown.get("not_named") else ""
+    return f"; {human(unknown['best_candidate'])} comes nearest{fault}"
 
 
 def parameter_sentence(conclusion: Conclusion, model_name: str) -> str:
@@ -89,7 +123,8 @@ VERDICTS_IN_WORDS: dict[str, tuple[str, Callable[[Conclusion, str], str]]] = {
 
 def heading(d: Diagnosis) -> str:
     """The verdict above its sentence."""
-    return "Effect named, with a remainder" if d.remainder else VERDICTS_IN_WORDS[d.verdict][0]
+    title = VERDICTS_IN_WORDS[d.verdict][0]
+    return f"{title}: {d.degree}" if d.verdict == "named" and d.degree not in (None, EXPLAINS_ALL) else title
 
 
 def all_off(conclusion: Conclusion) -> str:

@@ -12,6 +12,7 @@ from spikecam_env.gap.compare.prediction import Draw
 from spikecam_env.gap.fit.candidate import Fit
 from spikecam_env.gap.fit.problem import Problem
 from spikecam_env.gap.search.rivals import is_rival, lead
+from spikecam_env.sensor import SensorModel
 
 PER_PARAMETER = 2.0
 """Mean reduction of the deviance by a parameter without a meaning (Akaike)."""
@@ -47,6 +48,24 @@ def confirmed_in_order(
         done.append(confirm(waiting[0]))
         better = max(better, waiting.pop(0).misfit - done[-1].misfit)
     return sorted(done, key=lambda f: f.misfit), waiting
+
+
+def margin_of(model: SensorModel, before: float, fits: Sequence[Fit]) -> float:
+    """Of the misfit that the first fit removes, the share that no other fit removes: 0 to 1.
+
+    Fits of the first effect together with another one are no others.
+
+    Args:
+        model: that the candidates were added to.
+        before: its misfit.
+        fits: the chosen fit, then the others in any order; none removes nothing.
+    """
+    if not fits:
+        return 0.0
+    best, *rest = fits
+    others = [f.misfit for f in rest if best.name not in f.added_to(model)]
+    second = min([before, *others])
+    return float(max(second - best.misfit, 0.0) / max(before - best.misfit, 1e-9)) if best.misfit < before else 0.0
 
 
 def chosen_of(here: Problem, draws: Sequence[Draw], confirmed: Sequence[Fit]) -> tuple[list[Fit], tuple[str, ...]]:

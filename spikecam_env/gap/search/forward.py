@@ -24,7 +24,7 @@ from spikecam_env.gap.fit.joint import is_noisy, no_smaller, refined_together, s
 from spikecam_env.gap.fit.last_step import Errors
 from spikecam_env.gap.fit.problem import Problem
 from spikecam_env.gap.screen.templates import Templates
-from spikecam_env.gap.search.choice import PER_PARAMETER, chosen_of, confirmed_in_order
+from spikecam_env.gap.search.choice import PER_PARAMETER, chosen_of, confirmed_in_order, margin_of
 from spikecam_env.gap.search.joint_start import fit_pairs, one_by_one, with_pairs
 from spikecam_env.gap.search.neighbours import (
     may_try_without_earlier,
@@ -131,7 +131,8 @@ def with_candidates(problem: Problem, here: Problem, names: Sequence[str], templ
         anew = [confirm(f) for f in try_other_starts(here, done[0], turn.misfit, screened, tries)]
         done[0] = min((done[0], *anew), key=lambda f: f.misfit)
     done, rivals = chosen_of(here, problem.null.draws, done)
-    return replace(turn, fits=(*done, *rest), rivals=rivals)
+    margin = margin_of(here.model, turn.misfit, [*done, *rest])
+    return replace(turn, fits=(*done, *rest), rivals=rivals, margin=margin)
 
 
 def joined(problem: Problem, rounds: Sequence[Round], chance: float) -> list[Round]:

@@ -29,7 +29,7 @@ from spikecam_env.gap.fit.problem import Problem
 from spikecam_env.gap.fit.shapes import WORTH, with_fitted_shapes
 from spikecam_env.gap.screen.screen import Screened
 from spikecam_env.gap.search.cancelling_pair import PAIR, fit_pair
-from spikecam_env.gap.search.choice import chosen_of, confirmed_in_order
+from spikecam_env.gap.search.choice import chosen_of, confirmed_in_order, margin_of
 from spikecam_env.gap.search.round import SAME_SHARE, Round
 from spikecam_env.gap.search.shortlist import fit_from, may_be_shaped, recordings_of
 from spikecam_env.types import Floats
@@ -120,7 +120,7 @@ def try_in_place_of_earlier(problem: Problem, best: Fit, turn: Round) -> tuple[F
     order = sorted(turn.fits, key=lambda f: f.name != name)
     if name != first.name:
         best = replace(done[0], name=best.name, parameters=best.parameters, sd=best.sd)
-    return best, replace(turn, fits=tuple(order), rivals=rivals)
+    return best, replace(turn, fits=tuple(order), rivals=rivals, margin=margin_of(rest, here.misfit(), done))
 
 
 def try_in_place_of_last(problem: Problem, last: Round, errors: Errors, names: Sequence[str]) -> tuple[Round, Errors]:
@@ -140,7 +140,7 @@ def try_in_place_of_last(problem: Problem, last: Round, errors: Errors, names: S
         tried, known, used_held_out = refined_together(problem, other, [*names[:-1], other.name])
         if tried.misfit < last.fits[0].misfit - problem.settings.deviance.tie:
             rest = [f for f in last.fits if f.name != other.name]
-            last = replace(last, fits=(tried, *rest), rivals=(), used_held_out=used_held_out)
+            last = replace(last, fits=(tried, *rest), rivals=(), margin=0.0, used_held_out=used_held_out)
             errors = known
     return last, errors
 
@@ -227,6 +227,7 @@ def try_cancelling_pair(problem: Problem, names: Sequence[str], rounds: list[Rou
     one, other = (next(e for e in fitted.model.effects if e.name == name).parameters() for name in PAIR)
     alone = replace(fitted, name=PAIR[0], parameters={"tau_us": one["tau_us"]}, sd=errors[PAIR[0]])
     fitted = replace(fitted, parameters={"beta": other["beta"]}, sd=errors[PAIR[1]])
+    first = replace(first, margin=(last.misfit - fitted.misfit) / (first.misfit - fitted.misfit))
     between = replace(
         first,
         model=fitted.model.without(PAIR[1]),

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import itertools
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -46,12 +48,21 @@ class Round:
     """The candidates that were fitted, the chosen one first."""
     rivals: tuple[str, ...] = ()
     """Names that may as well be true as the chosen one."""
+    margin: float = 0.0
+    """Of the misfit that the chosen one removes, the share that no other candidate removes (`choice.margin_of`)."""
     used_held_out: bool = False
     """Whether held-out recordings were needed for parameters too."""
     motion_alone: bool = False
     """Whether held-out recordings in motion were fitted, since nothing else disagreed any more."""
     to_join: float = Deviance().accept
     """Misfit that its effect has to remove to be fitted together with the earlier ones."""
+
+
+def adding(rounds: Sequence[Round]) -> list[tuple[Round, Round]]:
+    """Rounds whose best is an effect of the last model, each with the round after it."""
+    last = {e.name for e in rounds[-1].model.effects} if rounds else set()
+    pairs = itertools.pairwise(rounds)
+    return [(r, after) for r, after in pairs if after.model is not r.model and r.fits[0].name in last]
 
 
 def has_candidate(turn: Round, here: Null) -> bool:

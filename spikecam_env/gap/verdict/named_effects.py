@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import itertools
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from functools import reduce
@@ -14,7 +13,7 @@ from spikecam_env.gap.candidates.table import candidate
 from spikecam_env.gap.fit.candidate import Fit
 from spikecam_env.gap.fit.coordinates import interval_of
 from spikecam_env.gap.result import MOST_CONFIDENCE, Estimate, NamedEffect
-from spikecam_env.gap.search.round import Round, absent
+from spikecam_env.gap.search.round import Round, absent, adding
 from spikecam_env.gap.verdict.comparison import Comparison
 from spikecam_env.gap.verdict.gap import gap_of
 from spikecam_env.sensor import SensorModel
@@ -31,8 +30,7 @@ def patched_model(comparison: Comparison, rounds: Sequence[Round]) -> SensorMode
 def kept(comparison: Comparison, rounds: Sequence[Round]) -> list[tuple[Fit, Round]]:
     """The best of each round whose effect is in the last model, with its parameters there, and the round."""
     last = {e.name: e.parameters() for e in patched_model(comparison, rounds).effects}
-    added = [r for r, after in itertools.pairwise(rounds) if after.model is not r.model]
-    best = [(r.fits[0], r) for r in added if r.fits[0].name in last]
+    best = [(r.fits[0], r) for r, _ in adding(rounds) if r.fits[0].name in last]
     return [(replace(f, parameters={k: last[f.name][k] for k in f.parameters}), r) for f, r in best]
 
 

@@ -1,9 +1,4 @@
-"""The remainder: the distance that named effects leave beyond chance, where their law differs from the catalogue's.
-
-It is judged in total, and by group of statistics and recording.  So a strong effect hides no other one elsewhere.  The
-best stand-in of a mechanism outside of the catalogue may take 99.9 % of the sum of squares.  Yet it leaves some group
-of some recording unchanged.  The right name of a slightly different law does not.
-"""
+"""The remainder: the distance that named effects leave beyond chance, its place and its look."""
 
 from __future__ import annotations
 
@@ -12,42 +7,37 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from spikecam_env.gap.compare.distance import adjusted, in_noise, loss, normal_deviates, residual
+from spikecam_env.gap.compare.distance import adjusted, in_noise, normal_deviates, residual
 from spikecam_env.gap.compare.prediction import Null, Prediction
+from spikecam_env.gap.observe.conditions import Condition
 from spikecam_env.gap.result import Remainder
 from spikecam_env.gap.statistics import StatisticKey
+from spikecam_env.gap.twins.case import Case
+from spikecam_env.gap.verdict.structure import is_common, marks_of, weight_by_group
+from spikecam_env.gap.verdict.where_and_when import when, where
 from spikecam_env.types import Floats
 
+KINDS = {
+    "dark": "the dark",
+    "picture": "static pictures",
+    "unknown": "static scenes",
+    "step": "the step of light",
+    "moving": "moving light",
+}
+"""Kinds of recordings in words; of flats see `light_in_words`."""
 
-def explains(null: Null, values: Floats, predicted: Prediction) -> bool:
-    """Whether a prediction leaves nothing of measured statistics (S,) but chance, or a remainder.
-
-    A remainder is a small share of the null model's distance in total (`most_left`), and in every group of every
-    recording (`most_left_there`).  Both are in the noise of the null model: the noise of the prediction contains a
-    share of its change, and would make the remainder look small.
-
-    Args:
-        values: (S,) measured statistics.
-    """
-    off, limits = is_left(null, values, predicted), null.settings.concluding
-    before, after = (in_noise(null, values, mean) for mean in (null.mean, predicted.mean))
-    at_first = sums_by_place(null.keys, before**2 - 1.0)
-    little = sums_by_place(null.keys, np.where(off, after**2, 0.0)) <= limits.most_left_there * np.maximum(
-        at_first, 1.0
-    )
-    deviance = [robust_beyond_chance(null, rho) for rho in (before, residual(null, values, predicted))]
-    return bool(not off.any() or (np.all(little) and deviance[1] < limits.most_left * deviance[0]))
+LOOKS = {"history": "a memory of earlier light", "neighbours": "a coupling of neighbours", "clock": "the clock's phase"}
+"""Marks of statistics (`structure.marks_of`) in words."""
 
 
-def remainder_of(
-    null: Null, values: Floats, predicted: Prediction, where: str = "", when: str = ""
-) -> Remainder | None:
+def remainder_of(case: Case, null: Null, values: Floats, predicted: Prediction) -> Remainder | None:
     """The remainder of a prediction; None where it leaves no more than chance.
 
     Args:
+        case: the measurement.
+        null: the null model.
         values: (S,) measured statistics.
-        where: part of the array, for `Remainder`.
-        when: part of the time, for `Remainder`.
+        predicted: under the model with the named effects.
     """
     off = is_left(null, values, predicted)
     if not off.any():
@@ -57,22 +47,51 @@ def remainder_of(
     groups = {
         g: float(np.sum(left[[k.group == g for k in null.keys]] ** 2)) for g in dict.fromkeys(k.group for k in keys)
     }
-    before, after = (beyond_chance(null, in_noise(null, values, mean)) for mean in (null.mean, predicted.mean))
+    recordings = tuple(dict.fromkeys(k.recording for k in keys))
+    marks = [words for mark, words in LOOKS.items() if marks_of(keys)[mark]]
     return Remainder(
         noises=float(left.max()),
-        share=after / max(before, 1.0),
+        share=share_left(null, values, predicted),
         worst=f"{keys[0].group}: {keys[0].name}",
         groups={g: s / sum(groups.values()) for g, s in sorted(groups.items(), key=lambda item: -item[1])},
-        recordings=tuple(dict.fromkeys(k.recording for k in keys)),
-        where=where,
-        when=when,
+        recordings=recordings,
+        light=light_in_words(case.conditions, recordings),
+        looks=("common to many pixels" if is_common(weight_by_group(null, left)) else "pixel by pixel", *marks),
+        where=where(case),
+        when=when(case),
     )
+
+
+def light_in_words(conditions: Sequence[Condition], names: Sequence[str]) -> tuple[str, ...]:
+    """Kinds of light of some recordings; flats are dim or bright where all of them are below or above the median.
+
+    Args:
+        conditions: of all recordings.
+        names: of some of them.
+    """
+    flats = {c.name: c.level for c in conditions if c.kind == "flat"}
+    own = [level for name, level in flats.items() if name in names]
+    middle = float(np.median(list(flats.values()))) if flats else 0.0
+    which = "dim " if own and max(own) < middle else "bright " if own and min(own) > middle else ""
+    kinds = dict.fromkeys(c.kind for c in conditions if c.name in names)
+    return tuple(KINDS.get(kind, f"the {which}flats") for kind in kinds)
 
 
 def is_left(null: Null, values: Floats, predicted: Prediction) -> NDArray[np.bool_]:
     """(S,) whether a statistic is off the prediction by more than chance and the accuracy of laws."""
     p = adjusted(normal_deviates(null, residual(null, values, predicted), predicted))
     return np.asarray(p < null.settings.judging.gate)
+
+
+def share_left(null: Null, values: Floats, predicted: Prediction) -> float:
+    """Squares of statistics (S,) that a prediction leaves off, over those beyond chance that there were.
+
+    Both are in the null model's noise: the noise of the prediction contains a share of its change, and would make the
+    rest look small.
+    """
+    off, after = is_left(null, values, predicted), in_noise(null, values, predicted.mean)
+    before = float(np.sum(null.weight * (in_noise(null, values) ** 2 - 1.0)))
+    return float(np.sum(null.weight * np.where(off, after**2, 0.0))) / max(before, 1.0)
 
 
 def squares_left(null: Null, values: Floats, predicted: Prediction) -> float:
@@ -86,13 +105,3 @@ def sums_by_place(keys: Sequence[StatisticKey], squares: Floats) -> Floats:
     of = {place: i for i, place in enumerate(dict.fromkeys(places))}
     place = np.array([of[p] for p in places])
     return np.asarray(np.bincount(place, squares)[place])
-
-
-def robust_beyond_chance(null: Null, rho: Floats) -> float:
-    """Deviance of residuals (S,) less that of chance; a large residual counts by its logarithm."""
-    return loss(null, rho) - float(np.sum(null.weight * np.ones(len(rho))))
-
-
-def beyond_chance(null: Null, distances: Floats) -> float:
-    """Sum of squares of distances (S,) less that of chance, at least 0; by the null's weights."""
-    return max(float(np.sum(null.weight * (distances**2 - 1.0))), 0.0)

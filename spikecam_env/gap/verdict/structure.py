@@ -35,14 +35,12 @@ def structure(case: Case, null: Null, off: Floats) -> dict[str, Any]:
     weight = weight_by_group(null, off)
     order = sorted(weight, key=lambda g: -weight[g])
     total = max(sum(weight.values()), 1e-9)
-    common = sum(weight[g] for g in _COMMON if g in weight)
     clear = np.abs(off) > CLEAR
     keys = [k for k, is_clear in zip(null.keys, clear, strict=True) if is_clear]
-    is_common = common > COMMON_SHARE * total
     return {
         "light": light_of(keys, kind),
         "level_exponent": level_exponent(null, off, kind, level),
-        "extent": "common to many pixels" if is_common else "pixel by pixel",
+        "extent": "common to many pixels" if is_common(weight) else "pixel by pixel",
         "time_scale_s": None,
         **marks_of(keys),
         "where": where(case) or None,
@@ -58,6 +56,11 @@ def weight_by_group(null: Null, off: Floats) -> dict[str, float]:
     for k, o in zip(null.keys, off, strict=True):
         weight[k.group] += float(np.log1p(o**2 / HEAVY))
     return weight
+
+
+def is_common(weight: Mapping[str, float]) -> bool:
+    """Whether a difference is common to many pixels, by its weight in each group of statistics."""
+    return sum(weight.get(g, 0.0) for g in _COMMON) > COMMON_SHARE * max(sum(weight.values()), 1e-9)
 
 
 def light_of(keys: Sequence[StatisticKey], kind: Mapping[str, str]) -> str:

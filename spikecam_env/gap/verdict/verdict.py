@@ -18,21 +18,33 @@ from spikecam_env.gap.fit.candidate import Fit
 from spikecam_env.gap.fit.confirm import confirmed
 from spikecam_env.gap.fit.problem import Problem
 from spikecam_env.gap.fit.shapes import WORTH
-from spikecam_env.gap.result import Conclusion, NamedEffect, Remainder, Statistic
+from spikecam_env.gap.result import (
+    EXPLAINS_ALL,
+    EXPLAINS_NEARLY_ALL,
+    LARGEST,
+    UNKNOWN,
+    Conclusion,
+    NamedEffect,
+    Statistic,
+)
 from spikecam_env.gap.search.forward import SECOND
 from spikecam_env.gap.search.round import Round
 from spikecam_env.gap.twins.case import Case
 from spikecam_env.gap.unit.refit import BaseFit
 from spikecam_env.gap.verdict.comparison import Comparison
+from spikecam_env.gap.verdict.degree import Explanation, explanation_of
 from spikecam_env.gap.verdict.gap import gap_of, usable_floor
 from spikecam_env.gap.verdict.named_effects import kept, named_by_refit, named_by_search, patched_model
 from spikecam_env.gap.verdict.notes import notes_of
 from spikecam_env.gap.verdict.ranking import ranking
-from spikecam_env.gap.verdict.remainder import explains, remainder_of, squares_left
+from spikecam_env.gap.verdict.remainder import remainder_of, squares_left
 from spikecam_env.gap.verdict.structure import structure
 from spikecam_env.gap.verdict.where_and_when import when, where
 from spikecam_env.sensor import SensorModel
 from spikecam_env.types import Floats
+
+NEARLY = (EXPLAINS_ALL, EXPLAINS_NEARLY_ALL)
+"""Degrees of a model that leaves little."""
 
 
 def conclude(comparison: Comparison, rounds: Sequence[Round], floor: float) -> Conclusion:
@@ -46,17 +58,18 @@ def conclude(comparison: Comparison, rounds: Sequence[Round], floor: float) -> C
     case, null = comparison.case, comparison.null
     last = rounds[-1].prediction if rounds else null.prediction
     left = residual(null, comparison.values, last)
-    explained = explains(null, comparison.values, last)
-    remainder = remainder_of(null, comparison.values, last, where(case), when(case)) if explained else None
     found = kept(comparison, rounds)
-    unexplained = (not explained or remainder is not None) and not may_be_chance(comparison, found)
-    off = {} if unexplained else parameters_off(comparison, rounds)
-    verdict = verdict_of(comparison, rounds, found, explained, remainder) or ("parameter" if off else "none")
+    explained = explanation_of(null, comparison.values, rounds) if rounds else Explanation(EXPLAINS_ALL)
+    is_clean = explained.degree == EXPLAINS_ALL or may_be_chance(comparison, found)
+    off = parameters_off(comparison, rounds) if is_clean else {}
+    verdict = verdict_of(comparison, rounds, found, explained.degree) or ("parameter" if off else "none")
     model = patched_model(comparison, rounds)
     return Conclusion(
         verdict=verdict,
+        degree={"named": explained.degree, "class": explained.degree, "unknown": UNKNOWN}.get(verdict),
         effects=() if verdict == "unknown" else named(comparison, rounds, found, explained),
-        unknown=described(comparison, found) if verdict == "unknown" else None,
+        stand_ins=tuple(f.name for f, _ in found if verdict == "unknown" or f.name not in explained.names),
+        unknown=described(comparison, found, explained) if verdict == "unknown" else None,
         class_=tied(found) if verdict == "class" else None,
         parameters=off,
         data=(*(c.text for c in comparison.contradictions), *notes_of([r for _, r in found])),
@@ -65,7 +78,7 @@ def conclude(comparison: Comparison, rounds: Sequence[Round], floor: float) -> C
         ranking=ranking(rounds, found, null.settings.deviance.accept),
         not_testable=comparison.not_testable,
         patched=with_strengths(model, off),
-        remainder=remainder if verdict == "named" else None,
+        remainder=remainder_of(case, null, comparison.values, last) if verdict == "named" else None,
     )
 
 
@@ -73,8 +86,7 @@ def verdict_of(
     comparison: Comparison,
     rounds: Sequence[Round],
     found: Sequence[tuple[Fit, Round]],
-    explained: bool,
-    remainder: Remainder | None = None,
+    degree: str,
 ) -> str:
     """The verdict on effects; "" if none is missing.
 
@@ -84,16 +96,15 @@ def verdict_of(
     Args:
         comparison: the measurement beside the null model.
         found: effects that were kept, with their rounds.
-        explained: whether the last round leaves chance, or a remainder.
-        remainder: the remainder, if there is one.
+        degree: one of `DEGREES`.
     """
-    enough = found and explained and not second_left_out(comparison.case)
+    enough = found and degree != UNKNOWN and not second_left_out(comparison.case)
     if comparison.contradictions:
         return "data"
     if rounds and not may_be_chance(comparison, found) and not enough:
         return "unknown"
     if any(r.rivals for _, r in found) and not comparison.missing:
-        return "unknown" if remainder else "class"
+        return "class" if degree == EXPLAINS_ALL else "unknown"
     return "named" if found or comparison.missing else ""
 
 
@@ -154,26 +165,32 @@ def second_left_out(case: Case) -> bool:
     return SECOND in case.budget.left_out
 
 
-def with_stand_ins(case: Case, null: Null, values: Floats, rounds: Sequence[Round]) -> list[Round]:
-    """The rounds up to the one that is named: the last that explains the data and takes most of the earlier remainder.
+def up_to_named(case: Case, null: Null, values: Floats, rounds: Sequence[Round]) -> list[Round]:
+    """The rounds up to the one whose effects are named.
 
-    A round that takes less stands for details of the earlier law.  If none explains the data, the rounds end at the
-    smallest held-out gap: an empirical patch has to be of use in recordings that took no part.
+    That is the last of those that explain all or nearly all and take most of the earlier remainder: a round that takes
+    less stands for details of the earlier law.  Otherwise it is the one with most names that are shown to be right,
+    and fewest others.  If there is none either, the rounds end at the smallest held-out gap: an empirical patch has to
+    be of use in recordings that took no part.
 
     Args:
         values: (S,) measured statistics.
     """
     *before, last = rounds
-    explaining = [r for r in rounds[1:] if explains(null, values, r.prediction)]
+    ends = [(r, explanation_of(null, values, rounds[: n + 1])) for n, r in enumerate(rounds) if n > 0]
+    explaining = [r for r, made in ends if made.degree in NEARLY]
+    right = [(r, made) for r, made in ends if made.degree == LARGEST]
     if explaining:
         end, little = explaining[0], 1.0 - WORTH
         for later in explaining[1:]:
             if squares_left(null, values, later.prediction) <= little * squares_left(null, values, end.prediction):
                 end = later
+    elif right:
+        end = max(right, key=lambda one: (len(one[1].names), -len(one[0].model.effects)))[0]
     else:
         gaps = [gap_of(case, null, values, null.mean, r.prediction).after for r in rounds]
         end = rounds[int(np.argmin(gaps))]
-    return list(rounds) if explaining and end is last else [*before, replace(end, fits=())]
+    return list(rounds) if end is last else [*before, replace(end, fits=())]
 
 
 def with_given_parameters(problem: Problem, tested: SensorModel, rounds: Sequence[Round]) -> list[Round]:
@@ -188,7 +205,7 @@ def with_given_parameters(problem: Problem, tested: SensorModel, rounds: Sequenc
     """
     *before, last = rounds
     null, values, names = problem.null, problem.values, {e.name for e in last.model.effects}
-    if names <= {e.name for e in tested.effects} or not explains(null, values, last.prediction):
+    if names <= {e.name for e in tested.effects} or explanation_of(null, values, rounds).degree not in NEARLY:
         return list(rounds)
     off = off_beside(problem.case, tested, last, last.base)
     count = problem.settings.twins.in_the_end
@@ -197,30 +214,32 @@ def with_given_parameters(problem: Problem, tested: SensorModel, rounds: Sequenc
         return list(rounds)
     own = Fit("", {}, {}, last.prediction, off.nominal, last.rho, last.misfit, last.model)
     given = confirmed(problem, own, count)
+    end = replace(last, base=given.base, prediction=given.prediction, rho=given.rho, misfit=given.misfit)
     left = squares_left(null, values, given.prediction)
     most = squares_left(null, values, last.prediction) <= (1.0 - WORTH) * left
-    if not explains(null, values, given.prediction) or (left > 0.0 and most):
+    if explanation_of(null, values, [*before, end]).degree not in NEARLY or (left > 0.0 and most):
         return list(rounds)
-    end = replace(last, base=given.base, prediction=given.prediction, rho=given.rho, misfit=given.misfit)
     return [*before, end]
 
 
 def named(
-    comparison: Comparison, rounds: Sequence[Round], found: Sequence[tuple[Fit, Round]], explained: bool
+    comparison: Comparison, rounds: Sequence[Round], found: Sequence[tuple[Fit, Round]], explained: Explanation
 ) -> tuple[NamedEffect, ...]:
-    """Effects that the refit found missing, if the search leaves nothing, and those that the search kept."""
+    """Effects that the refit found missing, if names are right, and those of the search that have a margin."""
     place, time = where(comparison.case), when(comparison.case)
-    by_search = tuple(named_by_search(comparison, f, r, place, time) for f, r in found)
-    if explained or may_be_chance(comparison, found) or not rounds:
+    by_search = tuple(named_by_search(comparison, f, r, place, time) for f, r in found if f.name in explained.names)
+    if explained.degree != UNKNOWN or may_be_chance(comparison, found) or not rounds:
         return (*(named_by_refit(m) for m in comparison.missing), *by_search)
     return by_search
 
 
-def described(comparison: Comparison, found: Sequence[tuple[Fit, Round]]) -> dict[str, Any]:
-    """The structure of an unknown discrepancy, and the search that was left out."""
+def described(comparison: Comparison, found: Sequence[tuple[Fit, Round]], explained: Explanation) -> dict[str, Any]:
+    """The structure of an unknown discrepancy, the nearest candidate and its faults, and the search left out."""
     case = comparison.case
     about = structure(case, comparison.null, comparison.residuals)
     about["best_candidate"] = found[0][0].name if found else None
+    if found:
+        about["not_named"] = explained.fault(case.settings.concluding)
     if second_left_out(case):
         about |= {"not_looked_for": SECOND, "effort": enough_effort(case)}
     return about

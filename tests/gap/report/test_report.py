@@ -117,7 +117,7 @@ def test_a_page_fetches_nothing_runs_nothing_and_is_small(verdict: str) -> None:
 
 def test_a_page_says_what_a_name_leaves() -> None:
     page = Page(report(replace(made_up.with_remainder(), evidence=None))).text
-    assert "Effect named, with a remainder" in page and "Largest deviation, in noise" in page
+    assert "Effect named: explains nearly all" in page and "Largest deviation, in noise" in page
     assert "8.1 (step: up 16-32)" in page and "step 86 %; moving 14 %" in page and "step, bars" in page
     assert "Largest deviation, in noise" not in Page(written("named")).text
 

@@ -8,7 +8,7 @@ from dataclasses import replace
 import made_up
 import pytest
 
-from spikecam_env.gap.report.sentence import gap_line, sentence
+from spikecam_env.gap.report.sentence import gap_line, heading, sentence
 from spikecam_env.gap.result import Diagnosis, Gap
 from spikecam_env.gap.verdict.notes import Note
 
@@ -23,11 +23,11 @@ def sentence_of(d: Diagnosis) -> str:
     [
         ("none", "No gap: these recordings and the model scsim agree to within the noise."),
         ("named", "Your camera has photodiode lag (fraction 6.12 %, tau 1.22 ms); adding it removes 97 % of the gap on "
-         "recordings that were not used."),
+         "recordings that were not used. It explains all of the difference: chance is left."),
         ("class", "Your camera has photo response nonlinearity or IR drop: these recordings do not show which; adding "
          "either removes 97 % of the gap on recordings that were not used."),
-        ("unknown", "Your camera does something that no candidate explains; adding an empirical patch removes 79 % of "
-         "the gap on recordings that were not used."),
+        ("unknown", "Your camera does something that no candidate explains; lamp drift comes nearest; adding an "
+         "empirical patch removes 79 % of the gap on recordings that were not used."),
         ("parameter", "No effect is missing, but parameters of the model scsim are off: shot noise is 31000 electrons, "
          "not 50000 electrons."),
         ("data", "The recordings contradict their own labels: flat-300: rates are 2.1 % (31 sd) above the line through "
@@ -40,7 +40,7 @@ def test_a_sentence_says_the_verdict(verdict: str, said: str) -> None:
 
 def test_a_gap_on_recordings_that_told_parameters_is_not_called_a_check() -> None:
     fitted = replace(made_up.named(), data=(Note.PARAMETERS_FROM_HELD_OUT,))
-    assert sentence_of(fitted).endswith("removes 97 % of the gap on the held-out recordings, which were fitted too.")
+    assert "removes 97 % of the gap on the held-out recordings, which were fitted too." in sentence_of(fitted)
 
 
 def test_what_a_note_is_decides_and_not_what_it_says() -> None:
@@ -54,18 +54,34 @@ def test_parameters_that_are_off_beside_an_effect_are_said() -> None:
     off = {"reset_noise": {"measured": 19.9, "nominal": 0.976, "ratio": 20.4}}
     said = sentence_of(replace(made_up.named(), parameters=off))
     assert said.endswith(
-        "not used. Parameters of the model scsim are off as well: reset noise is 19.9 mV, not 0.976 mV."
+        "chance is left. Parameters of the model scsim are off as well: reset noise is 19.9 mV, not 0.976 mV."
     )
 
 
-def test_a_remainder_is_said_with_its_size_and_place() -> None:
+def test_a_remainder_is_stated_with_its_size_its_place_and_its_look() -> None:
     said = sentence_of(made_up.with_remainder())
     assert said.endswith(
-        "not used. Its law differs in details from the catalogue's: 0.4 % of the sum of squares is left, 8.1 noises at "
-        "most, in step and moving."
+        "not used. It explains nearly all; its law differs in detail from the catalogue's. What is left, 0.4 % of the "
+        "squares and 8.1 noises at most, is in step and moving of the step of light and moving light: pixel by pixel, "
+        "with a memory of earlier light."
     )
     both = (*made_up.named().effects, *made_up.named("dead_time").effects)
-    assert "Their laws differ in details" in sentence_of(replace(made_up.with_remainder(), effects=both))
+    assert "They explain nearly all" in sentence_of(replace(made_up.with_remainder(), effects=both))
+
+
+def test_the_largest_of_several_effects_is_called_so() -> None:
+    assert sentence_of(made_up.largest()).endswith(
+        "not used. It is the largest of several effects; something else is there. The patched model has crosstalk too, "
+        "in place of something unknown. What is left, 16 % of the squares and 40.2 noises at most, is in rows and "
+        "noise of the dim flats: common to many pixels, with a coupling of neighbours."
+    )
+    assert heading(made_up.largest()) == "Effect named: largest of several"
+
+
+def test_an_unknown_effect_is_stated_with_the_nearest_candidate_and_its_fault() -> None:
+    about = {"best_candidate": "photodiode_lag", "not_named": "another candidate explains 78 % as much"}
+    said = sentence_of(replace(made_up.unknown(), unknown=about))
+    assert "no candidate explains; photodiode lag comes nearest, but another candidate explains 78 % as much;" in said
 
 
 def test_two_effects_are_named_together() -> None:

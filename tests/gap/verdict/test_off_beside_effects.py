@@ -21,12 +21,13 @@ LITTLE = 0.15
 """Of the largest deviate of the rates of a recording, left of a statistic that hardly moved."""
 
 
-def conclusion(left: float = 0.0, read: float = 1.0):
+def conclusion(left: float = 0.0, read: float = 1.0, margin: float = 0.9):
     """The conclusion on a unit whose s^2 is five times nominal, with a dead time.
 
     Args:
         left: share of the largest deviate that the fit leaves in the quietest statistic beside it.
         read: s^2 that the refit of a twin reads, over the unit's.
+        margin: of the name.
     """
     found = effect("dead_time", tau_us=0.5)
     null, model, case = small.null(), small.MODEL.with_effect(found), recorded(found)
@@ -45,7 +46,9 @@ def conclusion(left: float = 0.0, read: float = 1.0):
     draws = (replace(null.draws[0], refit=replace(noisy, white=read * noisy.white)),)
     close = Prediction(mean, null.noise, null.sd, draws)
     fit = Fit("dead_time", {"tau_us": 0.5}, {"tau_us": 0.01}, close, noisy, np.zeros(len(values)), 1.0, model)
-    first = Round(small.MODEL, case.base, null.prediction, residual(null, values, null.prediction), 900.0, (fit,))
+    first = Round(
+        small.MODEL, case.base, null.prediction, residual(null, values, null.prediction), 900.0, (fit,), margin=margin
+    )
     rounds = [first, Round(model, noisy, close, fit.rho, 1.0)]
     off = OffNominal({}, case.base)
     return conclude(Comparison(case, small.MODEL, small.MODEL, null, values, null.mean, (), off, ()), rounds, floor=1.0)
@@ -62,8 +65,8 @@ def test_beside_a_remainder_none_is():
     assert said.verdict == "named" and said.remainder is not None and said.parameters == {}
 
 
-def test_nor_beside_what_no_name_takes():
-    said = conclusion(left=4 * LITTLE)
+def test_nor_beside_what_several_names_explain():
+    said = conclusion(left=LITTLE, margin=0.2)
     assert said.verdict == "unknown" and said.remainder is None and said.parameters == {}
 
 

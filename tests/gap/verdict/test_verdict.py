@@ -1,4 +1,4 @@
-"""The verdict of made-up comparisons: limits of chance, and of the remainder."""
+"""The verdict of made-up comparisons: limits of chance, and degrees."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import pytest
 
 from spikecam_env.gap.baseline.off_nominal import OffNominal
 from spikecam_env.gap.compare.prediction import Null
-from spikecam_env.gap.result import Gap, Remainder
+from spikecam_env.gap.result import EXPLAINS_ALL, EXPLAINS_NEARLY_ALL, LARGEST, UNKNOWN, Gap
 from spikecam_env.gap.statistics import StatisticKey
 from spikecam_env.gap.verdict.comparison import Comparison, aligned_mean
 from spikecam_env.gap.verdict.notes import Note, gap_is_fitted, notes_of
@@ -53,17 +53,16 @@ def test_contradictions_come_first_then_what_is_left_then_ties_then_names() -> N
     found = [("fit", SimpleNamespace(rivals=()))]
     tied = [("fit", SimpleNamespace(rivals=("other",)))]
     rounds = ["a round"]
-    assert verdict_of(comparison(contradictions=("label",)), rounds, found, True) == "data"
-    assert verdict_of(comparison(), rounds, found, False) == "unknown"
-    assert verdict_of(comparison(), rounds, tied, True) == "class"
-    assert verdict_of(comparison(missing=("dark",)), rounds, tied, True) == "named"
-    assert verdict_of(comparison(), rounds, found, True) == "named"
-    assert verdict_of(comparison(), [], [], True) == ""
-    left = Remainder(8.0, 1e-3, "rates: 1", {"rates": 1.0}, ("flat",))
-    assert verdict_of(comparison(), rounds, found, True, left) == "named"
-    assert verdict_of(comparison(), rounds, tied, True, left) == "unknown", "two names leave as much"
+    every, most = EXPLAINS_ALL, EXPLAINS_NEARLY_ALL
+    assert verdict_of(comparison(contradictions=("label",)), rounds, found, every) == "data"
+    assert verdict_of(comparison(), rounds, found, UNKNOWN) == "unknown"
+    assert verdict_of(comparison(), rounds, tied, every) == "class"
+    assert verdict_of(comparison(missing=("dark",)), rounds, tied, every) == "named"
+    assert {verdict_of(comparison(), rounds, found, degree) for degree in (every, most, LARGEST)} == {"named"}
+    assert verdict_of(comparison(), [], [], every) == ""
+    assert verdict_of(comparison(), rounds, tied, most) == "unknown", "two names leave as much"
     left_out = SimpleNamespace(budget=SimpleNamespace(left_out=["a second effect"]))
-    assert verdict_of(comparison(case=left_out), rounds, found, True) == "unknown"
+    assert verdict_of(comparison(case=left_out), rounds, found, every) == "unknown"
 
 
 def test_a_share_of_a_gap_is_stated_where_there_is_one() -> None:

@@ -1,0 +1,96 @@
+"""How much of a difference the named effects explain, on one scale.
+
+    explains all           chance is left
+    explains nearly all    the names are right; their laws differ in detail from the catalogue's
+    largest of several     the names are right; something else is there as well
+    unknown                no name is shown to be right
+
+Two numbers show that a name is right.
+
+    margin    of the misfit that the effect removes, the share that no other candidate of its round removes
+    missed    of the squares by which the effects change statistics, the share that is left in the same places
+
+Where only some of the effects have a margin, these are the largest of several, and the others stand for something else.
+
+A place is a group of statistics of a recording.  It counts by the change that the effects make there, each by itself,
+and not by the difference that was there: a place that an effect does not change says nothing about its name.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from spikecam_env.gap.compare.distance import CLEAR, in_noise
+from spikecam_env.gap.compare.prediction import Null
+from spikecam_env.gap.result import EXPLAINS_ALL, EXPLAINS_NEARLY_ALL, LARGEST, UNKNOWN
+from spikecam_env.gap.search.round import Round, adding
+from spikecam_env.gap.settings import Concluding
+from spikecam_env.gap.verdict.remainder import is_left, share_left, sums_by_place
+from spikecam_env.types import Floats
+
+
+@dataclass(frozen=True)
+class Explanation:
+    """The part of a difference that the effects of a search explain."""
+
+    degree: str
+    """One of `DEGREES`."""
+    names: tuple[str, ...] = ()
+    """Effects whose names have a margin; of a model that explains all, every one."""
+    left: float = 0.0
+    """Share of the squares beyond chance that is left (`remainder.share_left`)."""
+    missed: float = 0.0
+    """Share of the squares of the effects' changes that is left where they change statistics."""
+    margin: float = 1.0
+    """The least margin of an effect."""
+
+    def fault(self, limits: Concluding) -> str:
+        """Why no name is shown to be right; empty where one is."""
+        if self.missed > limits.most_missed:
+            return f"{self.missed:.0%} of the squares of its change is left where it shows"
+        return "" if self.names else f"another candidate explains {1.0 - self.margin:.0%} as much"
+
+
+def explanation_of(null: Null, values: Floats, rounds: Sequence[Round]) -> Explanation:
+    """The part of measured statistics that the effects of all rounds explain.
+
+    Args:
+        null: the null model.
+        values: (S,) measured statistics.
+        rounds: of a search, the last with the final model.
+    """
+    last, steps, limits = rounds[-1].prediction, adding(rounds), null.settings.concluding
+    off = is_left(null, values, last)
+    every = tuple(r.fits[0].name for r, _ in steps)
+    if not off.any():
+        return Explanation(EXPLAINS_ALL, every)
+    left, after = share_left(null, values, last), in_noise(null, values, last.mean)
+    changes = squares_changed(null, rounds)
+    shows = shows_there(null, changes)
+    missed = float(np.sum(np.where(off & shows, after**2, 0.0)) / max(np.sum(np.where(shows, changes, 0.0)), 1.0))
+    names = tuple(r.fits[0].name for r, _ in steps if r.margin >= limits.least_margin)
+    degree = EXPLAINS_NEARLY_ALL if names == every and left <= limits.most_left else LARGEST
+    explained = Explanation(degree, names, left, missed, min((r.margin for r, _ in steps), default=0.0))
+    return replace(explained, degree=UNKNOWN) if explained.fault(limits) else explained
+
+
+def squares_changed(null: Null, rounds: Sequence[Round]) -> Floats:
+    """(S,) sum over effects of the square of each one's change, in the null model's noise."""
+    steps = adding(rounds)
+    changes = [np.nan_to_num((after.prediction.mean - r.prediction.mean) / null.noise) for r, after in steps]
+    return np.asarray(np.sum(np.square(changes), axis=0) if changes else np.zeros(len(null.keys)))
+
+
+def shows_there(null: Null, squares: Floats) -> NDArray[np.bool_]:
+    """(S,) whether a statistic is of a place that is changed clearly: by CLEAR noises of the sum of its squares.
+
+    Args:
+        null: the null model.
+        squares: (S,) squares of the change, in noise.
+    """
+    count = sums_by_place(null.keys, np.ones(len(null.keys)))
+    return np.asarray(sums_by_place(null.keys, squares) >= CLEAR**2 * np.sqrt(count))

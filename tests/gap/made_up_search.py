@@ -1,0 +1,31 @@
+"""Made-up searches: rounds that added effects, by the changes that they made."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+
+import numpy as np
+import small
+
+from spikecam_env.gap.compare.prediction import Null, Prediction
+from spikecam_env.gap.search.round import Round
+from spikecam_env.gap.verdict.degree import Explanation, explanation_of
+from spikecam_env.sensor import CATALOGUE
+
+
+def given(mean: np.ndarray) -> Prediction:
+    """A prediction of a mean (S,), of noise 1."""
+    return Prediction(mean, np.zeros(len(mean)), np.ones(len(mean)))
+
+
+def explained(
+    null: Null, values: np.ndarray, *changes: np.ndarray, margin: float | tuple[float, ...] = 0.9
+) -> Explanation:
+    """The explanation of values (S,) by effects that change the statistics one after the other."""
+    margins = margin if isinstance(margin, tuple) else (margin,) * len(changes)
+    model, unit, mean, rounds = small.MODEL, small.unit(), np.zeros(len(values)), []
+    for name, change, own in zip(("dead_time", "crosstalk"), changes, margins, strict=False):
+        best = SimpleNamespace(name=name)
+        rounds.append(Round(model, unit, given(mean), values - mean, 0.0, (best,), margin=own))  # type: ignore[arg-type]
+        model, mean = model.with_effect(CATALOGUE[name]()), mean + change
+    return explanation_of(null, values, [*rounds, Round(model, unit, given(mean), values - mean, 0.0)])
