@@ -249,11 +249,10 @@ class Concluding:
         most=1.0,
     )
     most_missed: float = setting(
-        0.1,
+        0.75,
         "of the squares of the change",
-        "Right names leave so much at most in the places that they change.",
+        "Right names leave so much at most in a group of statistics of a recording that they change.",
         TUNED,
-        most=1.0,
     )
 
 

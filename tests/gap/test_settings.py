@@ -104,7 +104,7 @@ def degree(settings: DiagnosisSettings, elsewhere: float = 1e-4, missed: float =
 
     Args:
         elsewhere: share of all squares that is in a statistic of another place.
-        missed: share of the squares of the effect's change that is left in a statistic of its own place.
+        missed: squares in a statistic of its own place, over those of the effect's change.
         margin: of the name.
     """
     keys = (*(StatisticKey("rates", "a", str(n)) for n in range(101)), StatisticKey("drift", "b", "0"))
@@ -122,7 +122,7 @@ DECISIONS = {
     "unit.usual": (1.8, dark_is_off),
     "searching.most_fitted": (1.0, lambda s, _: names_of_fitted(s)),
     "concluding.most_left": (0.05, lambda s, share: degree(s, elsewhere=share)),
-    "concluding.most_missed": (0.1, lambda s, share: degree(s, missed=share)),
+    "concluding.most_missed": (0.75, lambda s, share: degree(s, missed=share)),
     "concluding.least_margin": (0.5, lambda s, margin: degree(s, margin=margin)),
 }
 """By setting: its default, or 1, and a decision by the settings on a number a little below and above it."""

@@ -64,6 +64,9 @@ strengths drawn, some 0.002 frames, by parts in a million, which no recording of
 crossing and read-out, half a frame's in the mean, a share f is a dead time of f / 2 frames that scatters by 0.3 f."""
 
 
+NAMELESS = ("outside", "left_out")
+"""Groups of cases in which no name of the catalogue is right, or none that is not withheld."""
+
 SHOWN = 1.5
 """A gap of fewer floors has no share above the floor that is more than chance."""
 
@@ -74,6 +77,7 @@ class Scored:
 
     laws: of each hidden effect, the name of a far one, empty for the near.  answer: in short.
     spurious: names that stand for nothing hidden; off: those of them that are parameters only.
+    degree: how much the named effects explain, as the diagnosis states; empty where it names none.
     """
 
     id: str
@@ -93,6 +97,7 @@ class Scored:
     seconds: float
     threads: int = 1
     error: str = ""
+    degree: str = ""
 
     @property
     def is_far(self) -> bool:
@@ -152,6 +157,7 @@ def score_case(key: Json, result: Json) -> Scored:
         seconds=float(result.get("seconds", 0.0)),
         threads=int(result.get("threads", 1)),
         error=str(result.get("error", "")),
+        degree=str(diagnosis.get("degree") or ""),
     )
 
 
@@ -359,7 +365,7 @@ def by_category(scored: Sequence[Scored]) -> list[Json]:
             right = sum(s.right for s in some)
             low, high = binomial_90(right, len(some))
             seconds = [s.seconds for s in some]
-            names = group not in ("outside", "left_out") and any(s.laws for s in some)
+            names = group not in NAMELESS and any(s.laws for s in some)
             rows.append({
                 "category": group,
                 "law": ("far" if far else "near") if names else "",
@@ -372,6 +378,27 @@ def by_category(scored: Sequence[Scored]) -> list[Json]:
                 "median [s]": f"{np.median(seconds):.0f}",
                 "slowest [s]": f"{max(seconds):.0f}",
             })  # fmt: skip
+    return rows
+
+
+def by_degree(scored: Sequence[Scored]) -> list[Json]:
+    """One row a degree: how often it is stated, every name is true, and no hidden effect of the catalogue is missing.
+
+    Of `unknown`, which names nothing, names are true where nothing of the catalogue is hidden.
+    """
+    rows = []
+    for degree in dict.fromkeys(s.degree for s in sorted(scored, key=lambda s: s.degree) if s.degree):
+        some = [s for s in scored if s.degree == degree]
+        named = degree != "unknown"
+        true = sum(not s.spurious and s.group not in NAMELESS if named else s.group in NAMELESS for s in some)
+        low, high = binomial_90(true, len(some))
+        rows.append({
+            "degree": degree,
+            "cases": len(some),
+            "names true": f"{true}/{len(some)}",
+            "90 %": f"{100 * low:.0f} - {100 * high:.0f} %",
+            "and all of them": f"{sum(s.right for s in some)}/{len(some)}",
+        })  # fmt: skip
     return rows
 
 

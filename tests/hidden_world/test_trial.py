@@ -23,6 +23,7 @@ from tests.hidden_world.score import (
     FAMILIES,
     binomial_90,
     by_category,
+    by_degree,
     family_of,
     figures,
     is_covered,
@@ -340,6 +341,17 @@ def test_categories_are_counted_by_near_and_far_laws():
     assert (
         value["strong, far laws: right name"] == pytest.approx(1 / 3) and value["strong, near laws: right name"] == 1.0
     )
+
+
+def test_degrees_count_true_names_and_whole_answers():
+    """A pair of which one effect is named has true names, and not all of them."""
+    pair, outside = next(c for c in LAWS["tune"] if c.group == "strong_pair"), case_of("outside")
+    one = answered(pair, "named", pair.truth[0], degree="largest of several")
+    wrong = answered(outside, "named", "dead_time", degree="largest of several")
+    both = answered(pair, "named", *pair.truth, degree="explains nearly all")
+    rows = {r["degree"]: r for r in by_degree([one, wrong, both, answered(outside, "unknown", degree="unknown")])}
+    assert (rows["largest of several"]["names true"], rows["largest of several"]["and all of them"]) == ("1/2", "0/2")
+    assert rows["explains nearly all"]["and all of them"] == "1/1" and rows["unknown"]["names true"] == "1/1"
 
 
 def test_strong_effects_together_have_their_figures():

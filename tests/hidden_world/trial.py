@@ -27,7 +27,7 @@ from typing import Any
 
 from tests.hidden_world.cases import GROUPS, Case, cases
 from tests.hidden_world.keys import open_key, seal, write_whole
-from tests.hidden_world.score import Figure, Scored, by_category, by_effect, figures, score_case
+from tests.hidden_world.score import Figure, Scored, by_category, by_degree, by_effect, figures, score_case
 from tests.hidden_world.world import write_campaign
 
 Diagnose = Callable[[Path, str, Path, int, "tuple[str, ...]", int], "dict[str, Any]"]
@@ -167,6 +167,7 @@ def score_trial(out: Path, picked: Sequence[Case]) -> dict[str, Any]:
         "code": dict(by),
         "figures": [{**asdict(f), "met": f.met} for f in made],
         "categories": by_category(scored),
+        "degrees": by_degree(scored),
         "effects": by_effect(scored),
         "scored": [asdict(s) for s in scored],
     }
@@ -199,6 +200,9 @@ def as_text(trial: dict[str, Any]) -> str:
         "## By category and law",
         "",
         _table(trial["categories"]),
+        "## By degree",
+        "",
+        _table(trial["degrees"]),
         "## By effect: right of tried, by group",
         "",
         _table(

@@ -39,7 +39,10 @@ def none_sentence(conclusion: Conclusion, model_name: str) -> str:
 def named_sentence(conclusion: Conclusion, model_name: str) -> str:
     """Effects with their sizes, and the degree to which they explain the difference."""
     named = [f"{human(e.name)} ({plain_sizes(e)})" if e.parameters else human(e.name) for e in conclusion.effects]
-    said = f"Your camera has {listed(named, 'and')}{removed_phrase(conclusion, 'it' if len(named) == 1 else 'them')}."
+    them = "it" if len(named) == 1 else "them"
+    if conclusion.stand_ins:
+        them += f", with {listed([human(n) for n in conclusion.stand_ins], 'and')} in place of something unknown,"
+    said = f"Your camera has {listed(named, 'and')}{removed_phrase(conclusion, them)}."
     return f"{said} {degree_sentence(conclusion, len(named))}"
 
 
@@ -52,10 +55,8 @@ def degree_sentence(conclusion: Conclusion, names: int) -> str:
     if left is None:
         return f"{it} {verb} nearly all of the difference."
     if conclusion.degree == LARGEST:
-        largest = "is the largest" if names == 1 else "are the largest"
-        stand_ins = listed([human(name) for name in conclusion.stand_ins], "and")
-        beside = f" The patched model has {stand_ins} too, in place of something unknown." if stand_ins else ""
-        return f"{it} {largest} of several effects; something else is there.{beside} {left_sentence(left)}"
+        verb, which = "is" if names == 1 else "are", "among" if conclusion.stand_ins else "the largest of"
+        return f"{it} {verb} {which} several effects; something else is there. {left_sentence(left)}"
     return f"{it} {verb} nearly all; {its} in detail from the catalogue's. {left_sentence(left)}"
 
 

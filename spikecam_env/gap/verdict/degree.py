@@ -8,7 +8,7 @@
 Two numbers show that a name is right.
 
     margin    of the misfit that the effect removes, the share that no other candidate of its round removes
-    missed    of the squares by which the effects change statistics, the share that is left in the same places
+    missed    squares that are left over those of the effects' changes, in the worst of the places that they change
 
 Where only some of the effects have a margin, these are the largest of several, and the others stand for something else.
 
@@ -44,14 +44,14 @@ class Explanation:
     left: float = 0.0
     """Share of the squares beyond chance that is left (`remainder.share_left`)."""
     missed: float = 0.0
-    """Share of the squares of the effects' changes that is left where they change statistics."""
+    """Squares that are left over those of the effects' changes, in the worst of the places that they change."""
     margin: float = 1.0
     """The least margin of an effect."""
 
     def fault(self, limits: Concluding) -> str:
         """Why no name is shown to be right; empty where one is."""
         if self.missed > limits.most_missed:
-            return f"{self.missed:.0%} of the squares of its change is left where it shows"
+            return "somewhere it leaves as much as it changes"
         return "" if self.names else f"another candidate explains {1.0 - self.margin:.0%} as much"
 
 
@@ -70,8 +70,8 @@ def explanation_of(null: Null, values: Floats, rounds: Sequence[Round]) -> Expla
         return Explanation(EXPLAINS_ALL, every)
     left, after = share_left(null, values, last), in_noise(null, values, last.mean)
     changes = squares_changed(null, rounds)
-    shows = shows_there(null, changes)
-    missed = float(np.sum(np.where(off & shows, after**2, 0.0)) / max(np.sum(np.where(shows, changes, 0.0)), 1.0))
+    there = sums_by_place(null.keys, np.where(off, after**2, 0.0)) / np.maximum(sums_by_place(null.keys, changes), 1.0)
+    missed = float(np.max(np.where(shows_there(null, changes), there, 0.0)))
     names = tuple(r.fits[0].name for r, _ in steps if r.margin >= limits.least_margin)
     degree = EXPLAINS_NEARLY_ALL if names == every and left <= limits.most_left else LARGEST
     explained = Explanation(degree, names, left, missed, min((r.margin for r, _ in steps), default=0.0))

@@ -70,11 +70,15 @@ def test_a_remainder_is_stated_with_its_size_its_place_and_its_look() -> None:
 
 
 def test_the_largest_of_several_effects_is_called_so() -> None:
-    assert sentence_of(made_up.largest()).endswith(
-        "not used. It is the largest of several effects; something else is there. The patched model has crosstalk too, "
-        "in place of something unknown. What is left, 16 % of the squares and 40.2 noises at most, is in rows and "
-        "noise of the dim flats: common to many pixels, with a coupling of neighbours."
+    left = (
+        "something else is there. What is left, 16 % of the squares and 40.2 noises at most, is in rows and noise of "
+        "the dim flats: common to many pixels, with a coupling of neighbours."
     )
+    said = sentence_of(made_up.largest())
+    assert said.endswith(f"not used. It is among several effects; {left}")
+    assert "; adding it, with crosstalk in place of something unknown, removes 97 % of the gap" in said
+    said = sentence_of(replace(made_up.largest(), stand_ins=()))
+    assert said.endswith(f"not used. It is the largest of several effects; {left}") and "; adding it removes" in said
     assert heading(made_up.largest()) == "Effect named: largest of several"
 
 
