@@ -18,7 +18,15 @@ from spikecam_env.gap.report.quantities import (
     sizes,
 )
 from spikecam_env.gap.report.words import bare, group_meaning, human, listed, meaning_of, parameter_unit
-from spikecam_env.gap.result import EXPLAINS_NEARLY_ALL, LARGEST, SIGNIFICANT, Diagnosis, NamedEffect, Remainder, Statistic
+from spikecam_env.gap.result import (
+    EXPLAINS_NEARLY_ALL,
+    LARGEST,
+    SIGNIFICANT,
+    Diagnosis,
+    NamedEffect,
+    Remainder,
+    Statistic,
+)
 
 Rows = list[tuple[str, ...]]
 MOST_ROWS = 15
@@ -57,13 +65,13 @@ def off_rows(d: Diagnosis) -> Rows:
 REMAINDER = {
     EXPLAINS_NEARLY_ALL: (
         "The named effects explain nearly all of the difference. What is left is more than chance, but small: the law "
-        "of this camera differs in detail from the catalogue's, or a much weaker effect hides beside it. Parameters may "
-        "be off by more than their errors; the patched model holds for light like that of these recordings."
+        "of this camera differs in detail from the catalogue's, or a much weaker effect hides beside it. Parameters "
+        "may be off by more than their errors; the patched model holds for light like that of these recordings."
     ),
     LARGEST: (
         "The named effects are there: no other candidate explains as much, and they leave little where they act. They "
-        "do not explain the whole difference. Something else is there, of which this table shows the place; the patched "
-        "model may have stand-ins for it, which claim no physics."
+        "do not explain the whole difference. Something else is there, of which this table shows the place; the "
+        "patched model may have stand-ins for it, which claim no physics."
     ),
 }
 """How to read a remainder, by the degree of the explanation."""
