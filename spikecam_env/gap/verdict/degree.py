@@ -32,6 +32,9 @@ from spikecam_env.gap.settings import Concluding
 from spikecam_env.gap.verdict.remainder import is_left, share_left, sums_by_place
 from spikecam_env.types import Floats
 
+HALF = 0.5
+"""Of the squares: the largest of several effects leaves no more than it explains."""
+
 
 @dataclass(frozen=True)
 class Explanation:
@@ -52,6 +55,8 @@ class Explanation:
         """Why no name is shown to be right; empty where one is."""
         if self.missed > limits.most_missed:
             return "somewhere it leaves as much as it changes"
+        if self.left > HALF:
+            return f"it leaves {self.left:.0%} of the squares"
         return "" if self.names else f"another candidate explains {1.0 - self.margin:.0%} as much"
 
 

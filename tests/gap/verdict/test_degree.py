@@ -69,9 +69,10 @@ def test_only_effects_with_a_margin_are_named_beside_others() -> None:
 
 def test_something_elsewhere_says_nothing_on_the_name_and_makes_it_the_largest_of_several() -> None:
     change = off(pattern_flat=100.0)
-    weak, strong = explained(change + off(drift_dark=10.0), change), explained(change + off(drift_dark=50.0), change)
-    print(weak, strong)
+    weak, strong, more = (explained(change + off(drift_dark=noises), change) for noises in (10.0, 50.0, 150.0))
+    print(weak, strong, more)
     assert (weak.degree, strong.degree) == (EXPLAINS_NEARLY_ALL, LARGEST)
+    assert more.degree == UNKNOWN, "it is not the largest"
     assert weak.missed == strong.missed == 0.0 and strong.left == pytest.approx(0.2, rel=0.01)
 
 
