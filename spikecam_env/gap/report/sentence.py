@@ -67,7 +67,7 @@ def left_sentence(left: Remainder) -> str:
     looks = f": {left.looks[0]}" if left.looks else ""
     marks = f", with {listed(left.looks[1:], 'and')}" if left.looks[1:] else ""
     size = f"{percent(left.share)} of the squares and {left.noises:.1f} noises at most"
-    return f"What is left, {size}, is in {groups}{light}{looks}{marks}."
+    return f"What is left, {size}, is in the statistics {groups}{light}{looks}{marks}."
 
 
 def class_sentence(conclusion: Conclusion, model_name: str) -> str:

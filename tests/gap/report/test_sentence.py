@@ -62,8 +62,8 @@ def test_a_remainder_is_stated_with_its_size_its_place_and_its_look() -> None:
     said = sentence_of(made_up.with_remainder())
     assert said.endswith(
         "not used. It explains nearly all; its law differs in detail from the catalogue's. What is left, 0.4 % of the "
-        "squares and 8.1 noises at most, is in step and moving of the step of light and moving light: pixel by pixel, "
-        "with a memory of earlier light."
+        "squares and 8.1 noises at most, is in the statistics step and moving of the step of light and moving light: "
+        "pixel by pixel, with a memory of earlier light."
     )
     both = (*made_up.named().effects, *made_up.named("dead_time").effects)
     assert "They explain nearly all" in sentence_of(replace(made_up.with_remainder(), effects=both))
@@ -71,8 +71,8 @@ def test_a_remainder_is_stated_with_its_size_its_place_and_its_look() -> None:
 
 def test_the_largest_of_several_effects_is_called_so() -> None:
     left = (
-        "something else is there. What is left, 16 % of the squares and 40.2 noises at most, is in rows and noise of "
-        "the dim flats: common to many pixels, with a coupling of neighbours."
+        "something else is there. What is left, 16 % of the squares and 40.2 noises at most, is in the statistics "
+        "rows and noise of the dim flats: common to many pixels, with a coupling of neighbours."
     )
     said = sentence_of(made_up.largest())
     assert said.endswith(f"not used. It is among several effects; {left}")
