@@ -10,7 +10,7 @@ Two numbers show that a name is right.
     margin    of the misfit that the effect removes, the share that no other candidate of its round removes
     missed    squares that are left over those of the effects' changes, in the worst of the places that they change
 
-Where only some of the effects have a margin, these are the largest of several, and the others stand for something else.
+Where only some of the effects have a margin, these are among several, and the others stand for something else.
 
 A place is a group of statistics of a recording.  It counts by the change that the effects make there, each by itself,
 and not by the difference that was there: a place that an effect does not change says nothing about its name.
@@ -33,7 +33,8 @@ from spikecam_env.gap.verdict.remainder import is_left, share_left, sums_by_plac
 from spikecam_env.types import Floats
 
 HALF = 0.5
-"""Of the squares: the largest of several effects leaves no more than it explains."""
+"""Of the squares: the largest of several effects leaves no more than it explains.  Beside stand-ins it leaves a small
+share, `Concluding.most_left`: where they do not help, it may be one of them."""
 
 
 @dataclass(frozen=True)
@@ -44,6 +45,8 @@ class Explanation:
     """One of `DEGREES`."""
     names: tuple[str, ...] = ()
     """Effects whose names have a margin; of a model that explains all, every one."""
+    stand_ins: tuple[str, ...] = ()
+    """The other effects."""
     left: float = 0.0
     """Share of the squares beyond chance that is left (`remainder.share_left`)."""
     missed: float = 0.0
@@ -55,7 +58,7 @@ class Explanation:
         """Why no name is shown to be right; empty where one is."""
         if self.missed > limits.most_missed:
             return "somewhere it leaves as much as it changes"
-        if self.left > HALF:
+        if self.left > (limits.most_left if self.stand_ins else HALF):
             return f"it leaves {self.left:.0%} of the squares"
         return "" if self.names else f"another candidate explains {1.0 - self.margin:.0%} as much"
 
@@ -78,8 +81,9 @@ def explanation_of(null: Null, values: Floats, rounds: Sequence[Round]) -> Expla
     there = sums_by_place(null.keys, np.where(off, after**2, 0.0)) / np.maximum(sums_by_place(null.keys, changes), 1.0)
     missed = float(np.max(np.where(shows_there(null, changes), there, 0.0)))
     names = tuple(r.fits[0].name for r, _ in steps if r.margin >= limits.least_margin)
-    degree = EXPLAINS_NEARLY_ALL if names == every and left <= limits.most_left else LARGEST
-    explained = Explanation(degree, names, left, missed, min((r.margin for r, _ in steps), default=0.0))
+    stand_ins = tuple(name for name in every if name not in names)
+    degree = LARGEST if stand_ins or left > limits.most_left else EXPLAINS_NEARLY_ALL
+    explained = Explanation(degree, names, stand_ins, left, missed, min((r.margin for r, _ in steps), default=0.0))
     return replace(explained, degree=UNKNOWN) if explained.fault(limits) else explained
 
 

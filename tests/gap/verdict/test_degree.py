@@ -64,6 +64,8 @@ def test_only_effects_with_a_margin_are_named_beside_others() -> None:
     margins = (0.9, 0.1)
     made = explained(one + other + beside(drift_dark=20.0), one, other, margin=margins)
     assert made.degree == LARGEST and made.names == ("dead_time",)
+    worse = explained(one + other + off(drift_dark=100.0), one, other, margin=margins)
+    assert worse.degree == UNKNOWN, "the stand-in does not help"
     assert explained(one + other, one, other, margin=margins).names == ("dead_time", "crosstalk"), "chance is left"
 
 
