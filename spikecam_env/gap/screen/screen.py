@@ -90,11 +90,11 @@ def _in_proportion(entry: Template, null: Null, d: Floats, shift: Floats) -> Scr
     if scale <= 0 and not candidate(entry.name).may_be_negative:
         return None
     strength, power = CATALOGUE[entry.name].strength, candidate(entry.name).power
-    rho = (d - scale * shift) / np.sqrt(1.0 + scale**2 * own2 + (2 * TOLERANCE * scale * shift) ** 2)
+    wider = 1.0 + scale**2 * own2 + (2 * TOLERANCE * scale * shift) ** 2
     there = entry.parameters[strength] * np.sign(scale) * abs(scale) ** (1 / power)
     start = bounded(entry.name, {**entry.parameters, strength: there})
     white = 1.0 / (1.0 + abs(scale) * (1.0 / entry.white - 1.0))
-    return Screened(entry.name, start, loss(null, rho), scale * shift * null.noise, white)
+    return Screened(entry.name, start, misfit_of(null, d - scale * shift, wider), scale * shift * null.noise, white)
 
 
 def _scattered(entry: Template, null: Null, d: Floats, shift: Floats) -> Screened:
@@ -103,12 +103,24 @@ def _scattered(entry: Template, null: Null, d: Floats, shift: Floats) -> Screene
     size2 = pooled(null.keys, shift**2)
     tried = []
     for factor in np.geomspace(1e-3, 1e3, 100):
-        wider = 1.0 + factor * size2
-        penalty = float(np.sum(null.weight * np.log(wider) * (d != 0)))
-        tried.append((loss(null, d / np.sqrt(wider)) + penalty, factor))
+        tried.append((misfit_of(null, d, 1.0 + factor * size2), factor))
     left, factor = min(tried)
     start = bounded(entry.name, {**entry.parameters, strength: entry.parameters[strength] * factor ** (1 / power)})
     return Screened(entry.name, start, left, np.sqrt(factor * size2) * null.noise)
+
+
+def misfit_of(null: Null, left: Floats, wider: Floats) -> float:
+    """Misfit that a scaled template leaves, as that of a fit (`distance.residual_and_misfit`).
+
+    A template far above its own strength is vague: its noise, scaled as well, explains anything.  The logarithm of the
+    variance counts against it.
+
+    Args:
+        left: (S,) distances in noise, 0 where not measured.
+        wider: (S,) variance over the null model's.
+    """
+    log_variance = float(np.sum(null.weight * np.log(wider) * (left != 0)))
+    return loss(null, left / np.sqrt(wider)) + log_variance
 
 
 def _places(templates: Templates, conditions: Sequence[Condition], keys: Sequence[StatisticKey]) -> NDArray[np.int64]:
