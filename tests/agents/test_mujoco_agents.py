@@ -144,7 +144,7 @@ def test_the_classical_player_returns_most_slow_balls() -> None:
     """Of level 1, whose balls take 300 ms: it knows how the task is made, and sees pictures."""
     study = Study("Return-v1", options={"level": 1})
     env = study.make(split="test")
-    result = evaluate(classical(env.unwrapped), "Return-v1", episodes=4, **study.keywords)
+    result = evaluate(classical(env), "Return-v1", episodes=4, **study.keywords)
     print(result)
     assert result.success >= 0.5
     env.close()
