@@ -17,7 +17,7 @@ from spikecam_env.agents.agent import state_keywords
 from spikecam_env.agents.controllers.timing import PictureTiming
 from spikecam_env.agents.playing import Actor
 from spikecam_env.agents.tracker import FINDERS
-from spikecam_env.envs.observations import CameraView, FrameCamera, Observation, observation
+from spikecam_env.envs.observations import CameraView, FrameCamera, Observation, Spikes, observation
 from spikecam_env.envs.wrappers.any_env import spike_camera_of
 from spikecam_env.errors import InputError, unknown_name
 
@@ -90,7 +90,8 @@ def check_reads(task: str, obs: str | Observation) -> None:
     law = observation(obs)
     space, is_any = law.space(CameraView((2, 2), 40)), task in ANY_CAMERA
     is_grey = space.shape == (1, 2, 2) and space.dtype == np.uint8
-    if not is_grey or (isinstance(law, FrameCamera) and not is_any):
+    is_read = is_any or not isinstance(law, FrameCamera) if is_grey else task == "Read" and isinstance(law, Spikes)
+    if not is_read:
         readable = "grey pictures: tfp, rate, frame120 ..." if is_any else "pictures of a spike camera: tfp, rate ..."
         name = obs if isinstance(obs, str) else type(obs).__name__
         raise InputError(f"the classical player of {task} cannot read {name}; give it {readable}")

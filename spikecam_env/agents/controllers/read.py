@@ -5,11 +5,13 @@
     a path is a number's                    by the evidence of its best digit, less that of its best letter
 
 The answer is given when the best path has left the picture, or just before the earliest end of an episode.  Smear is
-that of the camera's exposure, and a picture that a slow camera shows again is no evidence.
+that of the camera's exposure, and a picture that a slow camera shows again is no evidence.  Frames of spikes are moved
+to where a plate of the level's speed is at their middle, then added: light of all of them, and little smear.
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from math import ceil, inf
 from typing import Any
 
@@ -57,7 +59,7 @@ class ReadController:
 
     Args:
         env: the bare task, whose shape and levels it is made for.
-        timing: of the pictures, which are grey; default: those of the task's own block.
+        timing: of the pictures, which are grey, or the frames of a block of spikes; default: of the task's own block.
 
     Example:
         >>> env = Read(level=1)
@@ -71,8 +73,8 @@ class ReadController:
         self._timing = PictureTiming.of(env) if timing is None else timing
         self._scale = env.shape[0] / VIEW
         lowest, highest = env.levels
-        exposure_s = self._timing.exposure_steps * STEP_S
-        self._levels = [_Speed(LEVEL[level].speed, self._scale, exposure_s) for level in range(lowest, highest + 1)]
+        pixels = self._scale * STEP_S
+        self._levels = [_Speed(LEVEL[n].speed * pixels, self._scale, self._timing) for n in range(lowest, highest + 1)]
         passage = (VIEW * env.shape[1] / env.shape[0] + SLED[0]) / (LEVEL[lowest].speed * (1 + SPEEDS_APART))
         self._last = ceil((BEFORE_S[0] + passage + AFTER_S) / STEP_S)
         self.begin()
@@ -89,8 +91,8 @@ class ReadController:
         middle = self._timing.middle_step(observation, self._steps)
         if middle > self._middle + ROUNDING:
             self._middle = middle
-            picture = self._seen(observation["picture"][0].astype(np.float32))
-            self._best = max(level.found(picture, middle, self._is_before(middle)) for level in self._levels)
+            planes = [self._seen(plane) for plane in observation["picture"].astype(np.float32)]
+            self._best = max(level.found(planes, middle, self._is_before(middle)) for level in self._levels)
         margin, number, is_gone = self._best
         self._steps += 1
         action = np.zeros(1 + len(DIGITS), np.float32)
@@ -113,9 +115,10 @@ class ReadController:
 class _Speed:
     """Plates and paths of a level."""
 
-    def __init__(self, speed: float, scale: float, exposure_s: float) -> None:
-        self._px_a_step = speed * scale * STEP_S
-        smear = max(1, round(speed * scale * exposure_s))
+    def __init__(self, px_a_step: float, scale: float, timing: PictureTiming) -> None:
+        self._px_a_step, self._way = px_a_step, px_a_step * timing.exposure_steps
+        share = 1.0 if timing.planes == 1 else SPEEDS_APART + 1.0 / timing.planes
+        smear = max(1, round(share * self._way))
         size = round(PLATE[0] * scale), round(PLATE[1] * scale)
         self._plates = [
             [_smeared(plate(name, variant), size, smear) for variant in range(VARIANTS)] for name in (*DIGITS, *LETTERS)
@@ -125,36 +128,42 @@ class _Speed:
     def begin(self) -> None:
         """Forget all pictures."""
         self._chance: Any = 0.0
-        self._evidence: list[tuple[float, Floats]] = []  # time [steps], (characters, columns)
+        self._evidence: list[tuple[float, Floats]] = []  # time [steps], as of `_evidence_of`
 
-    def found(self, picture: Pictures, now: float, is_empty: bool) -> tuple[float, int, bool]:
+    def found(self, planes: Sequence[Pictures], now: float, is_empty: bool) -> tuple[float, int, bool]:
         """Evidence of the best number with this further picture, the number, and whether it has left the picture.
 
         Args:
-            picture: the rows of plates.
+            planes: the rows of plates in the picture, or in each frame of a block.
             now: middle of its exposure [steps].
             is_empty: whether no sled can be in it, so that it shows what chance gives.
         """
-        seen = np.stack([_evidence(picture, variants) for variants in self._plates])
+        seen = self._evidence_of(planes)
         if is_empty and not self._evidence:
-            self._chance = CHANCE * seen.max(axis=1, keepdims=True)
+            self._chance = CHANCE * seen.max(axis=(0, 2))[:, None]
         self._evidence.append((now, np.maximum(seen - self._chance, 0.0)))
-        columns = seen.shape[1]
+        columns = seen.shape[2]
         room = int(self._px_a_step * (1 + SPEEDS_APART) * (now - self._evidence[0][0]))
         best = (-inf, 0, False)
         for speed in self._px_a_step * np.linspace(1 - SPEEDS_APART, 1 + SPEEDS_APART, SPEEDS):
-            for heading in (-1, 1):
+            for heading in range(2):
                 end = np.arange(0, columns + room, TOLERANCE)  # places now, in the direction of motion
                 total = np.zeros((len(self._plates), len(end)))
                 for time, evidence in self._evidence:
                     then = np.rint(end - speed * (now - time)).astype(int)
                     inside = (then >= 0) & (then < columns)
-                    total[:, inside] += evidence[:, then[inside] if heading > 0 else columns - 1 - then[inside]]
+                    total[:, inside] += evidence[heading][:, then[inside]]
                 digits, letters = np.split(total, [len(DIGITS)])
                 margin = digits.max(axis=0) - letters.max(axis=0)
                 at = int(margin.argmax())
                 best = max(best, (float(margin[at]), int(digits[:, at].argmax()), bool(end[at] >= columns)))
         return best
+
+    def _evidence_of(self, planes: Sequence[Pictures]) -> Floats:
+        """(2, characters, columns) for motion to the left and to the right; columns are in the direction of motion."""
+        pictures = planes if len(planes) == 1 else [_added(planes, heading * self._way) for heading in (-1, 1)]
+        seen = [np.stack([_evidence(picture, variants) for variants in self._plates]) for picture in pictures]
+        return np.stack([seen[0][:, ::-1], seen[-1]])
 
 
 def _smeared(picture: Pictures, size: tuple[int, int], smear: int) -> Pictures:
@@ -164,6 +173,16 @@ def _smeared(picture: Pictures, size: tuple[int, int], smear: int) -> Pictures:
     wide = cv2.copyMakeBorder(dark + light * small, 0, 0, smear, smear, cv2.BORDER_CONSTANT, value=PAINT)
     moved = cv2.blur(wide, (smear, 1), borderType=cv2.BORDER_REPLICATE)
     return np.asarray(moved[:, smear - beside : smear + size[0] + beside], np.float32)
+
+
+def _added(frames: Sequence[Pictures], way: float) -> Pictures:
+    """The mean of frames, each moved to where that which goes `way` pixels to the right is at their middle."""
+    back = way * ((np.arange(len(frames)) + 0.5) / len(frames) - 0.5)
+    moved = [
+        cv2.warpAffine(frame, np.array([[1, 0, -x], [0, 1, 0]]), frame.shape[::-1], borderValue=float(frame.mean()))
+        for frame, x in zip(frames, back, strict=True)
+    ]
+    return np.asarray(np.mean(moved, axis=0), np.float32)
 
 
 def _evidence(picture: Pictures, variants: list[Pictures]) -> Floats:

@@ -26,6 +26,8 @@ class PictureTiming(NamedTuple):
     exposure_frames: float
     """Of the camera's frames, from which a picture is made."""
     frames_a_step: float = float(USUAL_BLOCK)
+    planes: int = 1
+    """Of an observation: 1 of a picture, the frames of a block of spikes."""
 
     @classmethod
     def of(cls, env: gymnasium.Env[Any, Any]) -> PictureTiming:
@@ -44,7 +46,8 @@ class PictureTiming(NamedTuple):
         camera = spike_camera_of(env)
         if camera is None:
             return cls(float(getattr(env, "camera_defaults", {}).get("block_frames", USUAL_BLOCK)))
-        return cls(camera.observation.exposure(camera.view), STEP_S * camera.view.frame_rate_hz)
+        law, view = camera.observation, camera.view
+        return cls(law.exposure(view), STEP_S * view.frame_rate_hz, (law.space(view).shape or (1,))[0])
 
     @property
     def exposure_steps(self) -> float:
