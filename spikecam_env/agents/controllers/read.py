@@ -4,9 +4,10 @@
     evidence of a character on a path       its sum over the steps, along a place that moves evenly
     a path is a number's                    by the evidence of its best digit, less that of its best letter
 
-The answer is given when the best path has left the picture, or just before the earliest end of an episode.  Smear is
-that of the camera's exposure, and a picture that a slow camera shows again is no evidence.  Frames of spikes are moved
-to where a plate of the level's speed is at their middle, then added: light of all of them, and little smear.
+The answer is given just before the earliest end of an episode; where levels are mixed, and with them ends, when the
+best path has left the picture.  Smear is that of the camera's exposure, and a picture that a slow camera shows again is
+no evidence.  Frames of spikes are moved to where a plate of the level's speed is at their middle, then added: light of
+all of them, and little smear.
 """
 
 from __future__ import annotations
@@ -51,7 +52,7 @@ INK, PAINT = (0.05, 0.9), 0.28
 BESIDE = 16
 """Pixels beside a plate, at most, over which its smear is compared too: more are often out of view."""
 SURE = 60.0
-"""Evidence of a digit over that of letters [nats] at which it is believed."""
+"""Evidence of a digit over that of letters [nats] at which it is believed before the end."""
 
 
 class ReadController:
@@ -76,6 +77,7 @@ class ReadController:
         pixels = self._scale * STEP_S
         self._levels = [_Speed(LEVEL[n].speed * pixels, self._scale, self._timing) for n in range(lowest, highest + 1)]
         passage = (VIEW * env.shape[1] / env.shape[0] + SLED[0]) / (LEVEL[lowest].speed * (1 + SPEEDS_APART))
+        self._is_mixed = lowest < highest
         self._last = ceil((BEFORE_S[0] + passage + AFTER_S) / STEP_S)
         self.begin()
 
@@ -96,7 +98,8 @@ class ReadController:
         margin, number, is_gone = self._best
         self._steps += 1
         action = np.zeros(1 + len(DIGITS), np.float32)
-        action[0] = 1.0 if (is_gone and margin > SURE) or self._steps >= self._last else -1.0
+        is_early = self._is_mixed and is_gone and margin > SURE
+        action[0] = 1.0 if is_early or self._steps >= self._last else -1.0
         action[1 + number] = 1.0
         return action
 
