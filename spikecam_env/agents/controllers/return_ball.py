@@ -38,7 +38,7 @@ SPOTS = 10
 GATE_PX = 3.0
 """Farthest that a spot is from the place of its track in the next picture of a step later."""
 FASTEST_PX = 1.0
-"""Farther in each step more: a ball of level 5 moves by less until it is 15 cm away [pixels/step]."""
+"""Farther in each step more: a ball of level 5 from 40 cm aside moves by less until it is 30 cm away [pixels/step]."""
 PLACE_PX = 0.7
 """Error of a spot's place (sigma)."""
 LEAST, LEAST_SLOW = 5, 3
