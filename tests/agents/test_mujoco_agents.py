@@ -174,10 +174,10 @@ def test_the_same_reader_reads_through_each_camera(sight: str, level: int, tmp_p
 def test_a_reader_that_takes_one_camera_for_another_reads_less() -> None:
     """The smear of an exposure of 8.3 ms is not that of 0.2 ms: what tells cameras apart is their timing."""
     env = Study("Read-v1", "frame120", {"level": 1}).make(split="test")
-    right, wrong = (
-        judged(acting(reader), env, range(6)).success
-        for reader in (ReadController(env.unwrapped, timing) for timing in (PictureTiming.of(env), PictureTiming(8.0)))
-    )
+    bare: Any = env.unwrapped
+    timings = PictureTiming.of(env), PictureTiming(8.0)
+    right, wrong = (judged(acting(ReadController(bare, timing)), env, range(6)).success for timing in timings)
+    assert right is not None and wrong is not None
     print(f"of 6 episodes with its own exposure {right}, with that of another camera {wrong}")
     env.close()
     assert right > wrong
