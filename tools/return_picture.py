@@ -38,7 +38,7 @@ def played(episode: int) -> tuple[list[Image.Image], bool]:
     """A picture of every step of an episode, and whether the ball was returned."""
     options: dict[str, Any] = {"obs_state": True, "obs_inner": True, "render_mode": "rgb_array"}
     with closing(make_task("Return", level=LEVEL, split="test", **options)) as env:
-        player, frames = classical(env.unwrapped), ObservedStream(observation("frame120"), env.view, has_gaze=False)
+        player, frames = classical(env), ObservedStream(observation("frame120"), env.view, has_gaze=False)
         seen, info = env.reset(seed=episode, options={"episode": episode})
         player.begin()
         frames.begin()

@@ -14,8 +14,8 @@ import gymnasium
 from gymnasium.envs.registration import load_env_creator
 from gymnasium.wrappers import FrameStackObservation, ReshapeObservation
 
-from spikecam_env.agents.controllers import classical_policy
-from spikecam_env.agents.playing import episodes_of, judged, policy_of
+from spikecam_env.agents.controllers import classical, classical_sees
+from spikecam_env.agents.playing import acting, episodes_of, judged, policy_of
 from spikecam_env.checked import checked_count, checked_seed
 from spikecam_env.envs.evaluation import Evaluation
 from spikecam_env.envs.judged import is_judged
@@ -76,7 +76,8 @@ def evaluate(
     """
     name = _known(task)
     episodes = episodes_of(name) if episodes is None else checked_count(episodes, "episodes")
-    act, sees = classical_policy(name) if policy == CLASSICAL else policy_of(policy)
+    is_classical = isinstance(policy, str) and policy == CLASSICAL
+    act, sees = (None, classical_sees(name)) if is_classical else policy_of(policy)
     given = sees | ({} if obs is None else {"obs": obs}) | options
     if name not in ENVIRONMENTS:
         given["split"] = split
@@ -85,6 +86,7 @@ def evaluate(
         seen = _wrapped(stacked(env, checked_count(stack, "stack", MOST_STACK)), wrap)
         _check_spaces(policy, seen, stack)
         first = checked_seed(seed)
+        act = acting(classical(env)) if act is None else act
         return judged(act, seen, range(first, first + episodes), progress=progress)
     finally:
         env.close()

@@ -128,6 +128,7 @@ def _line(whose: tuple[str, str, str, str], rows: list[EntryRow]) -> dict[str, A
         "learner": learner,
         "frames [million]": rows[0].frames / 1e6,
         "seeds": len(rows[0].seeds),
+        "episodes": min(row.episodes for row in rows),
         "score": str(mean_of_seeds(np.mean([row.scores for row in rows], axis=0))),
         "success by level": ", ".join(f"{_said(row.level)}: {_said(mean_known(row.successes))}" for row in rows),
         "camera [Mbit/s]": None if bits is None else bits / 1e6,

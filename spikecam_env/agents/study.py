@@ -19,7 +19,7 @@ from tqdm import tqdm
 
 from spikecam_env.agents import learner_sb3
 from spikecam_env.agents.agent import Agent, shipped
-from spikecam_env.agents.controllers import CONTROLLERS, classical
+from spikecam_env.agents.controllers import CONTROLLERS, check_reads, classical
 from spikecam_env.agents.evaluation import stacked
 from spikecam_env.agents.playing import episodes_along, episodes_of, judged, policy_of, score_of
 from spikecam_env.agents.ppo import PPO
@@ -39,13 +39,14 @@ from spikecam_env.whole import write_text_whole
 T = TypeVar("T")
 R = TypeVar("R")
 
-SEEN = {"": "tfp", "-rate": "rate", "-clean": "clean"}
 CLASSICAL = ("classical", "tracker")
 """Names of the task's classical player; the second is the older one."""
-READY = {f"{who}{ending}": sight for who in (*CLASSICAL, "shipped") for ending, sight in SEEN.items()}
+READY = dict.fromkeys((*CLASSICAL, "shipped"), "tfp")
+READY |= {f"shipped-{sight}": sight for sight in ("rate", "clean")}
+READY |= {f"{who}-{sight}": sight for who in CLASSICAL for sight in SIGHTS if sight != "tfp"}
 READY |= dict.fromkeys(BASELINES, "tfp")
-"""Players that learn nothing -> observation: the classical player, the shipped agent, trained on `tfp`, and baselines,
-which look at no picture."""
+"""Players that learn nothing -> observation: the classical player through each camera, the shipped agent, trained on
+`tfp`, and baselines, which look at no picture."""
 LEARNERS = ("ppo", "sb3")
 """Our learner (`agents.ppo`), and that of stable-baselines3 with its defaults for pictures (`agents.learner_sb3`)."""
 
@@ -233,6 +234,9 @@ def _check_task(study: Study, sights: Sequence[str], has_levels: bool, trained: 
         raise unknown_name("agent", study.task, shipped())
     if players & {*CLASSICAL} and study.name not in CONTROLLERS:
         raise unknown_name("task of a classical controller", study.name, CONTROLLERS)
+    for sight in sights:
+        if sight.partition("-")[0] in CLASSICAL:
+            check_reads(study.name, SIGHTS[READY[sight]]["obs"])
 
 
 def measure(cases: Sequence[StudyRun], out: Path, points: int = POINTS) -> list[Result]:
@@ -318,7 +322,7 @@ def player_of(case: StudyRun, out: Path, env: gymnasium.Env[Any, Any]) -> Policy
     if who in BASELINES:
         return BASELINES[who]
     if who in CLASSICAL:
-        return policy_of(classical(env.unwrapped))[0]
+        return policy_of(classical(env))[0]
     if case.learner == "sb3":
         return policy_of(learner_sb3.load_sb3(folder))[0]
     return policy_of(Agent.load(case.task if case.sight in READY else folder / "agent.pt"))[0]

@@ -26,6 +26,7 @@ from spikecam_env.envs.mujoco_tasks import MUJOCO_TASKS, MujocoTask
 from spikecam_env.envs.observations import OBSERVATIONS
 from spikecam_env.envs.registration import ALL_TASKS, register
 from spikecam_env.envs.tasks import TASKS, Task
+from spikecam_env.envs.wrappers.any_env import USUAL_BLOCK
 from spikecam_env.errors import unknown_name
 from spikecam_env.run_folder import run_folder
 from spikecam_env.torch_settings import torch_settings
@@ -88,9 +89,10 @@ SIGHTS: dict[str, dict[str, Any]] = {
     **{obs: {"obs": obs} for obs in OBSERVATIONS if obs not in ("multibinary", "packed", "isi")},
     "clean": {"obs": "tfp", "model": "ideal"},
     "root_clean": {"obs": "root_tfp", "model": "ideal"},
+    "whole_spikes": {"obs": "spikes", "block_frames": USUAL_BLOCK},
 }
-"""Observations by name: every one that is a picture of bytes, of the noisy camera or another in its place; or `clean`,
-the rates of a camera without noise."""
+"""Observations by name: every one that is a picture of bytes, of the noisy camera or another in its place; `clean`,
+the rates of a camera without noise; or the spikes of the whole step, where a MuJoCo task shows a part."""
 
 LAGS = {"Catch": (0, 2, 5), "Saccade": (0, 3), "ReadSpin": (0, 1, 2, 4), "LowLight": (0, 1, 2, 3, 4)}
 LAGS |= dict.fromkeys(MUJOCO_TASKS, (0, 2, 5, 10)) | {"Read": (0, 1, 2, 3)}

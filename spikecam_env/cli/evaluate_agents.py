@@ -48,9 +48,11 @@ class Agents:
     )
     """Observations: tfp, tfi, spikes, rate (denoised), dim_rate (the same, brighter), clean (no noise), root_tfp,
     root_rate and root_clean (on a root scale, for the dark), frame30, frame120,
-    frame1000, root_frame30 ..., events; see docs/observations.md.
-    Without training: classical (the task's classical player, sees tfp), classical-rate, classical-clean; shipped (the
-    task's shipped agent, trained on tfp, sees it), shipped-rate, shipped-clean; oracle, nothing and random."""
+    frame1000, root_frame30 ..., short_frame30 ... (exposed for 0.2 ms), events; see docs/observations.md; whole_spikes
+    (of MuJoCo tasks, spikes of the whole step).
+    Without training: classical (the task's classical player, sees tfp), classical-rate, classical-clean, and of Read
+    and Return through every camera with grey pictures, classical-frame120 ...; shipped (the task's shipped agent,
+    trained on tfp, sees it), shipped-rate, shipped-clean; oracle, nothing and random."""
     intervals: tuple[float, ...] = ()
     """Mean intervals [frames] at which each task is played, each a row, and learned.  Default: the task's own light."""
     trained: tuple[float, float] | None = None

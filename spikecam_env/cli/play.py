@@ -47,7 +47,7 @@ class Play:
     """Environment, with or without `spikecam_env/`, e.g. Track-v1, Catch-v1, Fan-v0 (docs/environments.md)."""
     policy: str | None = None
     """Policy: keyboard, oracle, nothing, random, classical, an agent's name or its file (.pt); default: keyboard in a
-    window, oracle in a film."""
+    window, oracle in a film.  classical-OBS, as in classical-frame120, plays Read and Return through another camera."""
     film: Path | None = None
     """Write a film (.mp4) of it instead of opening a window; default where there is no display: ID.mp4."""
     episodes: Annotated[int | None, WholeRange(1, MOST_EPISODES)] = None

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from itertools import islice
 from pathlib import Path
 from typing import Any
 
@@ -14,9 +15,14 @@ from spikecam_env.agents import evaluate, learner_sb3
 from spikecam_env.agents import study as studies
 from spikecam_env.agents.agent import Agent
 from spikecam_env.agents.controllers import classical
+from spikecam_env.agents.controllers.read import ReadController
+from spikecam_env.agents.controllers.timing import PictureTiming
 from spikecam_env.agents.history import History
+from spikecam_env.agents.playing import acting, judged
 from spikecam_env.agents.ppo import PPO, train
 from spikecam_env.agents.training import Study, learner, recipe_of, train_agent
+from spikecam_env.cli.live.episodes import environment, episode
+from spikecam_env.cli.live.players import player
 from spikecam_env.cli.main import run as command
 from spikecam_env.errors import InputError
 
@@ -89,6 +95,9 @@ def test_an_agent_of_a_slow_camera_can_be_loaded(tmp_path: Path) -> None:
         ({"tasks": ["Return-v1"], "trained": (20.0, 50.0)}, "one mean interval"),
         ({"tasks": ["Return-v1"], "learners": ["sb4"]}, "sb3"),
         ({"tasks": ["ReadSpin-v1"], "sights": ["classical"]}, "classical controller"),
+        ({"tasks": ["Read-v1"], "sights": ["classical-events"]}, "Read cannot read events"),
+        ({"tasks": ["Return-v1"], "sights": ["classical-whole_spikes"]}, "Return cannot read spikes"),
+        ({"tasks": ["Balance-v1"], "sights": ["classical-frame120"]}, "Balance cannot read frame120"),
     ],
 )
 def test_studies_that_cannot_be_are_refused(given: dict[str, Any], said: str) -> None:
@@ -144,10 +153,57 @@ def test_the_classical_player_returns_most_slow_balls() -> None:
     """Of level 1, whose balls take 300 ms: it knows how the task is made, and sees pictures."""
     study = Study("Return-v1", options={"level": 1})
     env = study.make(split="test")
-    result = evaluate(classical(env.unwrapped), "Return-v1", episodes=4, **study.keywords)
+    result = evaluate(classical(env), "Return-v1", episodes=4, **study.keywords)
     print(result)
     assert result.success >= 0.5
     env.close()
+
+
+@pytest.mark.parametrize(
+    ("sight", "level"),
+    [("classical", 3), ("classical-whole_spikes", 5), ("classical-frame1000", 1), ("classical-frame120", 1)],
+)
+def test_the_same_reader_reads_through_each_camera(sight: str, level: int, tmp_path: Path) -> None:
+    """Plates at the speed that the camera is good for: 41 pixels of smear at frame120, 5 at frame1000."""
+    (case,) = studies.cases(["Read-v1"], [sight], [], [0], episodes=4, levels=[level])
+    (result,) = studies.study([case], tmp_path)
+    print(f"{sight}, level {level}: {result.success} of 4 episodes")
+    assert result.success is not None and result.success >= 0.75
+
+
+def test_a_reader_that_takes_one_camera_for_another_reads_less() -> None:
+    """The smear of an exposure of 8.3 ms is not that of 0.2 ms: what tells cameras apart is their timing."""
+    env = Study("Read-v1", "frame120", {"level": 1}).make(split="test")
+    bare: Any = env.unwrapped
+    timings = PictureTiming.of(env), PictureTiming(8.0)
+    right, wrong = (judged(acting(ReadController(bare, timing)), env, range(6)).success for timing in timings)
+    assert right is not None and wrong is not None
+    print(f"of 6 episodes with its own exposure {right}, with that of another camera {wrong}")
+    env.close()
+    assert right > wrong
+
+
+def test_pictures_have_the_middle_of_their_exposure_as_time_and_one_that_stays_keeps_it() -> None:
+    """A camera of 120 Hz: frame j is exposed from j / 120 s on; the episode's clock begins a step before step 0."""
+    env = Study("Return-v1", "frame120", {"level": 1}).make(split="test")
+    timing, middles = PictureTiming.of(env), []
+    observation, _ = env.reset(seed=0)
+    for step in range(40):
+        middles.append(timing.middle_step(observation, step))
+        observation, *_ = env.step(np.zeros(2, np.float32))
+    env.close()
+    assert np.isnan(middles[:8]).all()
+    known = np.unique(np.round([middle for middle in middles if middle == middle], 3))
+    np.testing.assert_allclose(known, (np.arange(len(known)) + 0.5) * 1000 / 120 - 1, atol=0.002)
+    assert len(known) == 4
+
+
+def test_the_classical_player_is_watched_through_a_frame_camera() -> None:
+    watched = player("classical-frame120", "Return-v1")
+    env = environment("Return-v1", watched, split="test")
+    first, second = islice(episode(env, watched, 0), 2)
+    env.close()
+    assert dict(watched.sees)["obs"] == "frame120" and (first.step, second.step) == (0, 1)
 
 
 def test_an_episode_of_a_mujoco_task_becomes_a_film(tmp_path: Path, monkeypatch, capsys) -> None:

@@ -88,6 +88,13 @@ def _mesh(path: Path) -> None:
     trimesh.creation.icosphere(1).export(path)
 
 
+def _robot(path: Path) -> None:
+    arm = '<body><joint axis="0 1 0"/><geom type="capsule" size=".05" fromto="0 0 0 .4 0 0"/></body>'
+    camera = '<camera pos="0 -2 0" xyaxes="1 0 0 0 0 1"/><light pos="0 -1 2"/>'
+    wall = '<geom type="box" size="5 .1 5" pos="0 3 0"/>'
+    path.write_text(f"<mujoco><worldbody>{camera}{wall}{arm}</worldbody></mujoco>", encoding="utf-8")
+
+
 def _calibrated(folder: Path) -> None:
     _campaign(folder.with_name("flats-of-it"))
     assert run(["calibrate", "flats-of-it", "--out", str(folder)]) == 0
@@ -103,6 +110,7 @@ BROUGHT: dict[str, Callable[[Path], None]] = {
     "wood.jpg": _picture,
     "kitchen.jpg": _picture,
     "teapot.obj": _mesh,
+    "robot.xml": _robot,
     "CAMPAIGN": _campaign,
     "camera-17": _campaign,
     "calibrated": _calibrated,

@@ -4,22 +4,26 @@
     evidence of a character on a path       its sum over the steps, along a place that moves evenly
     a path is a number's                    by the evidence of its best digit, less that of its best letter
 
-The answer is given when the best path has left the picture, or just before the earliest end of an episode.
+The answer is given just before the earliest end of an episode; where levels are mixed, and with them ends, when the
+best path has left the picture.  Smear is that of the camera's exposure, and a picture that a slow camera shows again is
+no evidence.  Frames of spikes are moved to where a plate of the level's speed is at their middle, then added: light of
+all of them, and little smear.
 """
 
 from __future__ import annotations
 
-from math import ceil
+from collections.abc import Sequence
+from math import ceil, inf
 from typing import Any
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from spikecam_env.agents.controllers.timing import PictureTiming
 from spikecam_env.envs.mujoco_tasks.read import (
     AFTER_S,
     BEFORE_S,
-    BLOCK_FRAMES,
     LETTERS,
     LEVEL,
     PLATE,
@@ -35,23 +39,28 @@ from spikecam_env.envs.mujoco_tasks.task import STEP_S
 from spikecam_env.envs.tasks.digits import DIGITS
 from spikecam_env.types import Floats, Pictures
 
-BLOCK_S = BLOCK_FRAMES / 40_000
-"""Time of an observed block [s]."""
 SPEEDS = 9
 """Speeds that are tried about each level's."""
 TOLERANCE = 2
 """Pixels by which a plate may lie beside its path."""
 CHANCE = 1.5
-"""Evidence that chance gives, over the most in the first picture, in which there is no sled."""
+"""Evidence that chance gives, over the most in the first picture, if that was taken before a sled can be in view."""
+ROUNDING = 1e-3
+"""Of times of pictures [steps]."""
+INK, PAINT = (0.05, 0.9), 0.28
+"""Light of a plate's darkest place and range up to its brightest, and mean light of the sled's paint beside it."""
+BESIDE = 16
+"""Pixels beside a plate, at most, over which its smear is compared too: more are often out of view."""
 SURE = 60.0
-"""Evidence of a digit over that of letters [nats] at which it is believed."""
+"""Evidence of a digit over that of letters [nats] at which it is believed before the end."""
 
 
 class ReadController:
     """Reads the plate: `begin` an episode, then `act(observation)`.
 
     Args:
-        env: the task, whose shape and levels it is made for; observations are of `obs="tfp"` and the task's own block.
+        env: the bare task, whose shape and levels it is made for.
+        timing: of the pictures, which are grey, or the frames of a block of spikes; default: of the task's own block.
 
     Example:
         >>> env = Read(level=1)
@@ -61,30 +70,42 @@ class ReadController:
         -1.0
     """
 
-    def __init__(self, env: Read) -> None:
+    def __init__(self, env: Read, timing: PictureTiming | None = None) -> None:
+        self._timing = PictureTiming.of(env) if timing is None else timing
         self._scale = env.shape[0] / VIEW
         lowest, highest = env.levels
-        self._levels = [_Speed(LEVEL[level].speed, self._scale) for level in range(lowest, highest + 1)]
+        pixels = self._scale * STEP_S
+        self._levels = [_Speed(LEVEL[n].speed * pixels, self._scale, self._timing) for n in range(lowest, highest + 1)]
         passage = (VIEW * env.shape[1] / env.shape[0] + SLED[0]) / (LEVEL[lowest].speed * (1 + SPEEDS_APART))
+        self._is_mixed = lowest < highest
         self._last = ceil((BEFORE_S[0] + passage + AFTER_S) / STEP_S)
-        self._steps = 0
+        self.begin()
 
     def begin(self) -> None:
         """Forget all pictures: an episode begins."""
-        self._steps = 0
+        self._steps, self._middle = 0, -inf
+        self._best = (-inf, 0, False)
         for level in self._levels:
-            level.evidence.clear()
+            level.begin()
 
     def act(self, observation: dict[str, NDArray[Any]]) -> NDArray[np.float32]:
         """The action, (11,)."""
-        picture = observation["picture"][0].astype(np.float32)
-        found = [level.found(self._seen(picture)) for level in self._levels]
-        margin, number, is_gone = max(found)
+        middle = self._timing.middle_step(observation, self._steps)
+        if middle > self._middle + ROUNDING:
+            self._middle = middle
+            planes = [self._seen(plane) for plane in observation["picture"].astype(np.float32)]
+            self._best = max(level.found(planes, middle, self._is_before(middle)) for level in self._levels)
+        margin, number, is_gone = self._best
         self._steps += 1
         action = np.zeros(1 + len(DIGITS), np.float32)
-        action[0] = 1.0 if (is_gone and margin > SURE) or self._steps >= self._last else -1.0
+        is_early = self._is_mixed and is_gone and margin > SURE
+        action[0] = 1.0 if is_early or self._steps >= self._last else -1.0
         action[1 + number] = 1.0
         return action
+
+    def _is_before(self, middle: float) -> bool:
+        """Whether a picture was taken before a sled can be in view."""
+        return middle + self._timing.exposure_steps / 2 <= BEFORE_S[0] / STEP_S + ROUNDING
 
     def _seen(self, picture: Pictures) -> Pictures:
         """The rows in which plates can be, with room at both sides for plates that are partly out of view."""
@@ -97,44 +118,74 @@ class ReadController:
 class _Speed:
     """Plates and paths of a level."""
 
-    def __init__(self, speed: float, scale: float) -> None:
-        self._px_a_step = speed * scale * STEP_S
-        smear = max(1, round(speed * scale * BLOCK_S))
+    def __init__(self, px_a_step: float, scale: float, timing: PictureTiming) -> None:
+        self._px_a_step, self._way = px_a_step, px_a_step * timing.exposure_steps
+        share = 1.0 if timing.planes == 1 else SPEEDS_APART + 1.0 / timing.planes
+        smear = max(1, round(share * self._way))
         size = round(PLATE[0] * scale), round(PLATE[1] * scale)
         self._plates = [
             [_smeared(plate(name, variant), size, smear) for variant in range(VARIANTS)] for name in (*DIGITS, *LETTERS)
         ]
-        self.evidence: list[Floats] = []
-        """(characters, columns) of every step."""
+        self.begin()
 
-    def found(self, picture: Pictures) -> tuple[float, int, bool]:
-        """Evidence of the best number with this further picture, the number, and whether it has left the picture."""
-        seen = np.stack([_evidence(picture, variants) for variants in self._plates])
-        if not self.evidence:
-            self._chance = CHANCE * seen.max(axis=1, keepdims=True)
-        self.evidence.append(np.maximum(seen - self._chance, 0.0))
-        now, columns = len(self.evidence) - 1, seen.shape[1]
-        room = int(self._px_a_step * (1 + SPEEDS_APART) * now)
-        best = (-np.inf, 0, False)
+    def begin(self) -> None:
+        """Forget all pictures."""
+        self._chance: Any = 0.0
+        self._evidence: list[tuple[float, Floats]] = []  # time [steps], as of `_evidence_of`
+
+    def found(self, planes: Sequence[Pictures], now: float, is_empty: bool) -> tuple[float, int, bool]:
+        """Evidence of the best number with this further picture, the number, and whether it has left the picture.
+
+        Args:
+            planes: the rows of plates in the picture, or in each frame of a block.
+            now: middle of its exposure [steps].
+            is_empty: whether no sled can be in it, so that it shows what chance gives.
+        """
+        seen = self._evidence_of(planes)
+        if is_empty and not self._evidence:
+            self._chance = CHANCE * seen.max(axis=(0, 2))[:, None]
+        self._evidence.append((now, np.maximum(seen - self._chance, 0.0)))
+        columns = seen.shape[2]
+        room = int(self._px_a_step * (1 + SPEEDS_APART) * (now - self._evidence[0][0]))
+        best = (-inf, 0, False)
         for speed in self._px_a_step * np.linspace(1 - SPEEDS_APART, 1 + SPEEDS_APART, SPEEDS):
-            for heading in (-1, 1):
+            for heading in range(2):
                 end = np.arange(0, columns + room, TOLERANCE)  # places now, in the direction of motion
                 total = np.zeros((len(self._plates), len(end)))
-                for step, evidence in enumerate(self.evidence):
-                    then = np.rint(end - speed * (now - step)).astype(int)
+                for time, evidence in self._evidence:
+                    then = np.rint(end - speed * (now - time)).astype(int)
                     inside = (then >= 0) & (then < columns)
-                    total[:, inside] += evidence[:, then[inside] if heading > 0 else columns - 1 - then[inside]]
+                    total[:, inside] += evidence[heading][:, then[inside]]
                 digits, letters = np.split(total, [len(DIGITS)])
                 margin = digits.max(axis=0) - letters.max(axis=0)
                 at = int(margin.argmax())
                 best = max(best, (float(margin[at]), int(digits[:, at].argmax()), bool(end[at] >= columns)))
         return best
 
+    def _evidence_of(self, planes: Sequence[Pictures]) -> Floats:
+        """(2, characters, columns) for motion to the left and to the right; columns are in the direction of motion."""
+        pictures = planes if len(planes) == 1 else [_added(planes, heading * self._way) for heading in (-1, 1)]
+        seen = [np.stack([_evidence(picture, variants) for variants in self._plates]) for picture in pictures]
+        return np.stack([seen[0][:, ::-1], seen[-1]])
+
 
 def _smeared(picture: Pictures, size: tuple[int, int], smear: int) -> Pictures:
-    """A plate of (columns, rows) pixels that moves by `smear` of them."""
+    """A plate of (columns, rows) pixels that moves by `smear` of them, with its smear over BESIDE at both sides."""
     small = cv2.resize(picture, size, interpolation=cv2.INTER_AREA)
-    return np.asarray(cv2.blur(small, (smear, 1), borderType=cv2.BORDER_REPLICATE), np.float32)
+    beside, (dark, light) = min(smear // 2, BESIDE), INK
+    wide = cv2.copyMakeBorder(dark + light * small, 0, 0, smear, smear, cv2.BORDER_CONSTANT, value=PAINT)
+    moved = cv2.blur(wide, (smear, 1), borderType=cv2.BORDER_REPLICATE)
+    return np.asarray(moved[:, smear - beside : smear + size[0] + beside], np.float32)
+
+
+def _added(frames: Sequence[Pictures], way: float) -> Pictures:
+    """The mean of frames, each moved to where that which goes `way` pixels to the right is at their middle."""
+    back = way * ((np.arange(len(frames)) + 0.5) / len(frames) - 0.5)
+    moved = [
+        cv2.warpAffine(frame, np.array([[1, 0, -x], [0, 1, 0]]), frame.shape[::-1], borderValue=float(frame.mean()))
+        for frame, x in zip(frames, back, strict=True)
+    ]
+    return np.asarray(np.mean(moved, axis=0), np.float32)
 
 
 def _evidence(picture: Pictures, variants: list[Pictures]) -> Floats:

@@ -6,7 +6,7 @@
 
 For each speed v of the levels, pixels are linear in the start s, the crossing c and the bend a, which have normal
 priors.  All balls of an episode have one speed, that with the most evidence.  Of all spots the one that most likely
-crosses within reach counts: other balls cross beyond.
+crosses within reach counts: other balls cross beyond.  t is the middle of a picture's exposure, whatever the camera.
 """
 
 from __future__ import annotations
@@ -17,16 +17,16 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from spikecam_env.agents.controllers.timing import PictureTiming
 from spikecam_env.envs.mujoco_tasks.return_ball import AWAY, BEND, HALF, LEVEL, REACH, STARTS
 from spikecam_env.envs.mujoco_tasks.task import EYE, STEP_S
 from spikecam_env.types import Floats
 
 BLUR_PX = 1.0
 """Sigma of the noise filter [pixels]: a far ball's radius."""
-KEPT, KEPT_LONG = 0.5, 0.1
-"""Weights of a picture in the means over two and ten steps; the lowest of the latter is a pixel without a ball."""
-DELAY_STEPS = 1.5
-"""Age of a spot: half a step of exposure, and one by which the mean over two is late."""
+LEFT, LEFT_LONG = 0.5, 0.9
+"""Of old pictures in the means over two and ten steps, a step later; the lowest of the latter is a pixel without a
+ball."""
 LEAST_RATE = 0.01
 """Of a pixel whose noise grows as the square root of its rate [spikes/frame]."""
 AROUND_PX = 4.0
@@ -36,15 +36,20 @@ EXCESS = 9.0
 SPOTS = 10
 """Spots of a picture that are followed at most."""
 GATE_PX = 3.0
-"""Farthest that a spot is from the place of its track in a step."""
+"""Farthest that a spot is from the place of its track in the next picture of a step later."""
+FASTEST_PX = 1.0
+"""Farther in each step more: a ball of level 5 from 40 cm aside moves by less until it is 30 cm away [pixels/step]."""
 PLACE_PX = 0.7
 """Error of a spot's place (sigma)."""
-LEAST = 5
-"""Places of a track that is believed."""
+LEAST, LEAST_SLOW = 5, 3
+"""Places of a track that is believed; of a camera whose pictures are more than SLOW_STEPS apart."""
+SLOW_STEPS = 2.0
 LEAST_PX = 1.5
 """Motion of a track that is believed [pixels]."""
 LOST = 8
-"""Steps without a spot after which a track ends."""
+"""Steps and, of a slow camera, a picture without a spot after which a track ends."""
+SAME = 1e-6
+"""Of times: as good as the same."""
 FRAME_PX = 2.0
 """Spots as near to the paddle's frame are the frame's."""
 BEYOND = 0.4
@@ -79,15 +84,14 @@ class SpotTrack(NamedTuple):
     time_s: list[float]
     places: list[Floats]
     """(x, y) [pixels]."""
-    seen: int
-    """Step of the last place."""
 
 
 class ReturnController:
-    """Acts like an `Agent`; observations are of `obs="tfp"`.
+    """Acts like an `Agent`.
 
     Args:
         env: a bare `Return`.
+        timing: of the pictures, which are grey; default: those of the spike camera's block.
 
     Example:
         >>> import gymnasium
@@ -98,7 +102,8 @@ class ReturnController:
         >>> env.close()
     """
 
-    def __init__(self, env: Any) -> None:
+    def __init__(self, env: Any, timing: PictureTiming | None = None) -> None:
+        self._timing = PictureTiming.of(env) if timing is None else timing
         camera = env.model.camera(EYE)
         rows, columns = env.shape
         self._focal = rows / 2 / np.tan(np.radians(float(camera.fovy[0])) / 2)
@@ -113,11 +118,21 @@ class ReturnController:
         self._now: Any = None  # (rows, columns), as `_slow` and `_floor`; of no picture yet
         self._slow: Any = None
         self._floor: Any = None
-        self._step = 0
+        self._step, self._newest, self._apart = 0, -np.inf, 1.0  # [steps], of the newest picture and from the last one
         self._aim = np.zeros(2)
 
     def act(self, observation: dict[str, NDArray[Any]]) -> NDArray[np.float32]:
         """The place to which the paddle goes: where the most likely ball crosses."""
+        middle = self._timing.middle_step(observation, self._step)
+        self._step += 1
+        if middle > self._newest + SAME:
+            self._apart = middle - self._newest if np.isfinite(self._newest) else 1.0
+            self._newest = middle
+            self._look(observation)
+        return np.clip(self._aim / REACH, -1, 1).astype(np.float32)
+
+    def _look(self, observation: dict[str, NDArray[Any]]) -> None:
+        """Follow the spots of a new picture, and set the aim."""
         left, up = REACH * np.asarray(observation["inner"], np.float64)[:2]
         paddle = self._middle + self._focal / self._eye * np.array([-left, -up])
         self._follow(self._spots(observation["picture"][0].astype(np.float32) / 255, paddle))
@@ -126,20 +141,19 @@ class ReturnController:
         if reached:
             left, up = max(reached, key=lambda crossing: crossing.within_reach).place
             self._aim = np.array([-left, up])
-        self._step += 1
-        return np.clip(self._aim / REACH, -1, 1).astype(np.float32)
 
     def _is_ball(self, track: SpotTrack) -> bool:
         """Whether a track is long enough, has moved, and no ball would have passed by now."""
         slowest = min(numbers.speed for numbers in LEVEL.values())
         moved = float(np.hypot(*(track.places[-1] - track.places[0])))
-        return len(track.time_s) >= LEAST and moved >= LEAST_PX and slowest * track.time_s[-1] < AWAY
+        least = LEAST if self._apart <= SLOW_STEPS else LEAST_SLOW
+        return len(track.time_s) >= least and moved >= LEAST_PX and slowest * track.time_s[-1] < AWAY
 
     def _spots(self, picture: NDArray[np.float32], paddle: Floats) -> list[Floats]:
         """Places (x, y) brighter than their surroundings, and than they ever were."""
         smooth = cv2.GaussianBlur(picture, (0, 0), BLUR_PX)
-        self._now = smooth if self._now is None else self._now + KEPT * (smooth - self._now)
-        self._slow = smooth if self._slow is None else self._slow + KEPT_LONG * (smooth - self._slow)
+        self._now = smooth if self._now is None else smooth + LEFT**self._apart * (self._now - smooth)
+        self._slow = smooth if self._slow is None else smooth + LEFT_LONG**self._apart * (self._slow - smooth)
         self._floor = self._slow if self._floor is None else np.minimum(self._floor, self._slow)
         excess = (self._now - self._floor) / np.sqrt(self._floor + LEAST_RATE)
         excess = excess - cv2.GaussianBlur(excess, (0, 0), AROUND_PX)
@@ -153,14 +167,16 @@ class ReturnController:
 
     def _follow(self, spots: list[Floats]) -> None:
         """Each track takes the nearest spot; other spots begin tracks."""
-        free, now = list(spots), max(0.0, self._step - DELAY_STEPS) * STEP_S
+        left = LEFT**self._apart
+        free, now = list(spots), max(0.0, self._newest - self._apart * left / (1 - left)) * STEP_S
+        gate, lost_s = GATE_PX + FASTEST_PX * (self._apart - 1), (LOST + 2 * (self._apart - 1)) * STEP_S
         for n, track in enumerate(self._tracks):
             away = [float(np.hypot(*(spot - track.places[-1]))) for spot in free]
-            if away and min(away) < GATE_PX:
+            if away and min(away) < gate:
                 spot = free.pop(int(np.argmin(away)))
-                self._tracks[n] = SpotTrack([*track.time_s, now], [*track.places, spot], self._step)
-        kept = [track for track in self._tracks if self._step - track.seen <= LOST]
-        self._tracks = kept + [SpotTrack([now], [spot], self._step) for spot in free]
+                self._tracks[n] = SpotTrack([*track.time_s, now], [*track.places, spot])
+        kept = [track for track in self._tracks if now - track.time_s[-1] <= lost_s + SAME]
+        self._tracks = kept + [SpotTrack([now], [spot]) for spot in free]
 
     def _crossings(self, balls: list[SpotTrack]) -> list[Crossing]:
         """Of each ball, by the speed with the most evidence of all."""

@@ -73,7 +73,7 @@ def full_name(name: str) -> str:
 
 def episode(env: gymnasium.Env[Any, Any], player: Player, seed: int) -> Iterator[Moment]:
     """Reset, then step by step to the end of the episode."""
-    camera, inner = spike_camera_of(env), judged_env(env)
+    camera, inner, act = spike_camera_of(env), judged_env(env), player.act_in(env)
     if camera is None:
         raise TypeError(f"{type(inner).__name__} has no spike camera before it")
     inner.action_space.seed(seed)
@@ -84,7 +84,7 @@ def episode(env: gymnasium.Env[Any, Any], player: Player, seed: int) -> Iterator
         yield Moment(seed, step, info["frame"], info["time_s"], spikes, reward, total, info, over)
         if over:
             return
-        action = np.asarray(player.act(seen, inner), np.float32)
+        action = np.asarray(act(seen, inner), np.float32)
         seen, paid, terminated, truncated, info = env.step(action)
         step, reward, over = step + 1, float(paid), bool(terminated or truncated)
         total += reward

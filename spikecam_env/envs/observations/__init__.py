@@ -52,6 +52,10 @@ def _of_place(place: str, keywords: dict[str, Any]) -> Observation:
     return law
 
 
+SHORT_S = 2e-4
+"""A short exposure [s]: 8 frames of the spike camera, as many as Read-v1 shows of a step."""
+FRAME_CAMERAS: dict[str, dict[str, Any]] = {"": {}, "root_": {"gamma": 0.5}, "short_": {"exposure_s": SHORT_S}}
+"""First part of a frame camera's name, and its keywords."""
 OBSERVATIONS: dict[str, Callable[[], Observation]] = {
     "multibinary": Multibinary,
     "spikes": Spikes,
@@ -62,9 +66,9 @@ OBSERVATIONS: dict[str, Callable[[], Observation]] = {
     "isi": ISI,
     **{name: partial(_of_place, place, keywords) for name, (place, keywords) in OBSERVATIONS_ABOVE.items()},
     **{
-        f"{scale}frame{rate}": partial(FrameCamera, float(rate), gamma=gamma, sensor=sensor)
+        f"{how}frame{rate}": partial(FrameCamera, float(rate), sensor=sensor, **keywords)
         for rate, sensor in ((30, FrameSensor()), (120, FrameSensor()), (1000, HIGH_SPEED))
-        for scale, gamma in (("", 1.0), ("root_", 0.5))
+        for how, keywords in FRAME_CAMERAS.items()
     },
     "events": EventCounts,
 }

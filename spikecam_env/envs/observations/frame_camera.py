@@ -144,6 +144,9 @@ class FrameCamera(Observation):
             np.zeros(streams),
         )
 
+    def exposure(self, view: CameraView) -> float:
+        return self._exposure(view.frame_rate_hz)
+
     def step(self, blocks: Blocks, state: Shutter) -> tuple[NDArray[np.uint8], Shutter]:
         if not len(blocks.light):
             raise InputError("a frame camera needs the light on the sensor, which this environment does not know")
@@ -186,9 +189,10 @@ class FrameCamera(Observation):
 
     def _timing(self, blocks: Blocks) -> Timing:
         rate = blocks.frame_rate_hz
-        period = rate / self.rate_hz
-        exposure = period if self.exposure_s is None else self.exposure_s * rate
-        return Timing(period, exposure, self.row_time_s * rate, blocks.spikes.shape[2])
+        return Timing(rate / self.rate_hz, self._exposure(rate), self.row_time_s * rate, blocks.spikes.shape[2])
+
+    def _exposure(self, frame_rate_hz: float) -> float:
+        return frame_rate_hz / self.rate_hz if self.exposure_s is None else self.exposure_s * frame_rate_hz
 
     def age(self, state: Shutter) -> NDArray[np.float64]:
         return np.where(state.end < 0, -1.0, state.now - state.end)

@@ -67,6 +67,9 @@ class TFP(Observation):
             raise InputError(f"window is {self.window}; on a device it is {view.frames_per_step} at most, the step's")
         return RecentFrames(np.zeros((streams, kept, *view.shape), np.uint8), np.zeros(streams, np.int64))
 
+    def exposure(self, view: CameraView) -> float:
+        return float(self.window or view.frames_per_step)
+
     def step(self, blocks: Blocks, state: RecentFrames) -> tuple[NDArray[np.uint8], RecentFrames]:
         count, kept = blocks.spikes.shape[1], state.frames.shape[1]
         window = self.window or count

@@ -79,6 +79,10 @@ class Observation(ABC):
         """(N,) age of the newest light in the picture [frames]; -1 before the first valid picture."""
         return 0.0
 
+    def exposure(self, view: CameraView) -> float:
+        """Time whose light makes a picture [frames]: what moves is smeared by its way in that time."""
+        return float(view.frames_per_step)
+
     def info(self, blocks: Blocks, state: Any) -> list[dict[str, Any]]:
         """Info of this step about the camera, a dictionary a stream.
 

@@ -158,8 +158,9 @@ class SpikeCamera(gymnasium.Wrapper[Any, Any, Any, Any], gymnasium.utils.RecordC
         self._camera_seed = 0  # of this episode
         self._blocks: Blocks | None = None
         self._obs_inner = checked_switch(obs_inner, "obs_inner")
+        self.observation = observation(obs)
         self._observed = ObservedStream(
-            observation(obs), self.view, obs_state=checked_switch(obs_state, "obs_state"), has_gaze=False
+            self.observation, self.view, obs_state=checked_switch(obs_state, "obs_state"), has_gaze=False
         )
         self.observation_space = self._space()
 
