@@ -10,7 +10,7 @@ the alarm rings: a diagnosis then searches for the fault, and states no bound.
 
 Linear bounds rest on templates of the standard case, 64 x 64 pixels and 8000 frames: their size on these recordings is
 scaled.  They are compared with the simulated ones of the same campaign.  The safety factor was chosen on cameras from
-2000 on, and is judged on those from 1000 on.
+2000 on; those from 1000 on judge it.
 
 Trials in the file are not repeated; it is written after every trial.  The limit is 95 % of all trials, and 90 % of each
 effect's (of 20 trials, 18).

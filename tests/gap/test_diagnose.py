@@ -158,7 +158,9 @@ def test_bounds_may_be_left_out(clean, quick):
 
 @pytest.mark.parametrize("kind", [True, "exact", None])
 def test_an_unknown_kind_of_bounds_is_refused_in_one_line(kind, clean):
-    with pytest.raises(InputError, match="choose one of linear, simulated, none") as refused:
+    with pytest.raises(
+        InputError, match=r"unknown kind of bounds .*; choose one of linear, none, simulated"
+    ) as refused:
         asked(clean, bounds=kind)
     assert "\n" not in str(refused.value)
 

@@ -116,7 +116,6 @@ def test_a_terminal_shows_the_verdict_and_the_effects(verdict: str) -> None:
         (["--exclude", "lag"], "'lag'"),
         (["--jobs", "0"], "--jobs 0"),
         (["--effort", "0"], "--effort 0"),
-        (["--bounds", "exact"], "--bounds"),
     ],
 )
 def test_a_wrong_option_ends_in_one_line(options, message: str, campaign: Path, tmp_path: Path, capsys) -> None:
