@@ -32,7 +32,7 @@ from spikecam_env.gap.screen.templates import Template, Templates
 from spikecam_env.gap.statistics import StatisticKey
 from spikecam_env.gap.statistics.spectrum import bands
 from spikecam_env.sensor import CATALOGUE
-from spikecam_env.types import Floats
+from spikecam_env.types import Floats, Masks
 
 
 class Response(NamedTuple):
@@ -129,6 +129,7 @@ def rescaled(
     own2 = pair_noise_share(templates.keys) ** 2 / (null.settings.twins.drawn_units if of_units else 1)
     clear = np.where(is_clear(entry.shift, own2), entry.shift, 0.0) * templates.noise
     at = same_bands(templates, null.keys, places(templates, conditions, null.keys), frames)
+    at = np.where(alike(templates, null.keys, conditions), at, -1)
     size = np.zeros(len(at))
     for i in np.flatnonzero((at >= 0) & (clear[at] != 0) & np.isfinite(null.mean)):
         key = templates.keys[at[i]]
@@ -167,6 +168,17 @@ def size_of(name: str, response: Response, change: float, there: float, here: fl
         root = 2.0 if response.way == "rms" else 1.0
         return factor * float(np.expm1(root * change) * np.exp(root * (there - here)))
     return factor * change if response.way == "mean" else 0.0
+
+
+def alike(templates: Templates, keys: Sequence[StatisticKey], conditions: Sequence[Condition]) -> Masks:
+    """(S,) whether statistics are of light as of the templates: dark, even, a step, or motion of the same name."""
+    kinds = {c.name: c.kind for c in conditions}
+    return np.array(
+        [
+            k.recording in templates.kinds if k.group == "moving" else kinds[k.recording] in templates.kinds.values()
+            for k in keys
+        ]
+    )
 
 
 def same_bands(

@@ -67,6 +67,7 @@ def bounds(
     of its size.
 
     Args:
+        case: the measurement.
         model: the model that explains it.
         null: the prediction of that model.
         measured: (S,) statistics.
@@ -88,7 +89,7 @@ def bounds(
     expense = case.settings.bounding.campaigns * len(case.conditions)
     if kind == "simulated" and not case.budget.allows("upper bounds", expense):
         return [], [(name, MORE_EFFORT) for name in by_name]
-    if case.scenes_only:
+    if case.scenes_only and starts:
         case = replace(case, base=unit_under(case, model))
 
     def scored(start: tuple[Template, Parameters]) -> ScoredShape:

@@ -85,6 +85,21 @@ def test_the_course_of_an_effect_is_not_known_from_recordings_of_another_length(
     assert np.array_equal(on(entry, frames=FRAMES * 4 // 5).size[late], on(entry).size[late])
 
 
+def test_of_other_moving_light_no_response_is_known():
+    """The lag of bars is not that of another scene; that of a step is, whatever its name."""
+    entry = WEAKEST["photodiode_lag"]
+    names = {"bars": "a street", "step": "a lamp"}
+    shown = [
+        replace(c, name=names.get(c.name, c.name)) for c in planned_conditions(standard_design(), (64, 64), FRAMES)
+    ]
+    keys = tuple(k._replace(recording=names.get(k.recording, k.recording)) for k in TEMPLATES.keys)
+    null = Null(keys, TEMPLATES.mean, TEMPLATES.noise, 0 * TEMPLATES.mean, 12, 11)
+    size = rescaled(TEMPLATES, entry, null, shown, TEMPLATES.shape).size
+    of = {name: size[[k.recording == name for k in keys]] for name in ("a street", "a lamp")}
+    assert on(entry).size[[k.recording == "bars" for k in TEMPLATES.keys]].any()
+    assert not of["a street"].any() and of["a lamp"].any()
+
+
 def test_an_unknown_statistic_does_not_respond():
     entry = replace(WEAKEST["dead_time"], shift=np.zeros(len(TEMPLATES.keys)))
     assert not on(entry).change(1.0).any()
