@@ -1,16 +1,16 @@
 """Whether upper bounds hold: the share of campaigns with an effect at its bound that state a smaller bound.
 
     python -m benchmarks.bound_coverage --trials 20 --jobs 2 --out table.json
-    python -m benchmarks.bound_coverage --kind linear --trials 10 --out linear.json
-    python -m benchmarks.bound_coverage --kind linear --trials 10 --camera 2000 --out calibration.json
+    python -m benchmarks.bound_coverage --kind linear --trials 5 --out linear.json
+    python -m benchmarks.bound_coverage --kind linear --trials 5 --camera 4000 --only afterpulsing --out others.json
 
 A campaign with nothing hidden states a bound of every candidate.  Then each effect is hidden at its bound in TRIALS
 campaigns of other cameras, and each states its own bound.  A bound covers if it is no smaller, if there is none, or if
 the alarm rings: a diagnosis then searches for the fault, and states no bound.
 
 Linear bounds rest on templates of the standard case, 64 x 64 pixels and 8000 frames: their size on these recordings is
-scaled.  They are compared with the simulated ones of the same campaign.  The safety factor was chosen on cameras from
-2000 on; those from 1000 on judge it.
+scaled.  They are compared with the simulated ones of the same campaign.  The factor SAFETY was chosen on cameras
+from 2000 on, and SAFETY_OF_CHANCE on those from 1000 on: other cameras judge it.
 
 Trials in the file are not repeated; it is written after every trial.  The limit is 95 % of all trials, and 90 % of each
 effect's (of 20 trials, 18).
