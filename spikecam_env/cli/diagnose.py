@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import tyro
 
@@ -43,8 +43,9 @@ class Diagnose:
     """Budget: how often the campaign may be simulated before optional steps are skipped; inf for no limit."""
     static_only: bool = False
     """In unknown scenes with motion, use only the pixels in which nothing moves."""
-    bounds: bool = False
-    """Also simulate upper bounds of the effects that were not found, by some 200 campaigns more."""
+    bounds: Literal["linear", "simulated", "none"] = "linear"
+    """Upper bounds of the effects that were not found: by linear response, at no simulation; simulated, by some 200
+    campaigns more; or none."""
     settings: Annotated[Path | None, tyro.conf.arg(metavar="FILE")] = None
     """Tuned numbers other than the defaults, a TOML file of lines such as `deviance.tie = 8.0`; all of them stand in
     docs/reference/diagnosis_settings.md."""
@@ -116,7 +117,7 @@ def summary(diagnosis: Diagnosis) -> str:
 
 def _rows(diagnosis: Diagnosis) -> list[dict[str, Any]]:
     """A row a parameter: of effects, of present parameters that are off, or of bounds where nothing was found."""
-    from spikecam_env.gap.report.quantities import at_most, bounded_parameter, interval, quantity
+    from spikecam_env.gap.report.quantities import at_most, bound_heading, bounded_parameter, interval, quantity
     from spikecam_env.gap.report.words import bare, parameter_unit
 
     rows = [
@@ -135,8 +136,6 @@ def _rows(diagnosis: Diagnosis) -> list[dict[str, Any]]:
     if diagnosis.parameters:
         return [{"parameter": name, **values} for name, values in diagnosis.parameters.items()]
     if diagnosis.verdict == "none":
-        return [
-            {"effect": b.name, "parameter": bounded_parameter(b), "at most (95 %)": at_most(b)}
-            for b in diagnosis.bounds
-        ]
+        head = bound_heading(diagnosis.bounds)
+        return [{"effect": b.name, "parameter": bounded_parameter(b), head: at_most(b)} for b in diagnosis.bounds]
     return []

@@ -18,7 +18,7 @@ from typing import Any
 from tqdm import tqdm
 
 from spikecam_env.campaign.reading import Campaign, read_campaign
-from spikecam_env.errors import InputError
+from spikecam_env.errors import InputError, unknown_name
 from spikecam_env.gap.baseline.contradiction import Contradiction
 from spikecam_env.gap.baseline.halves_floor import floor_of_halves
 from spikecam_env.gap.baseline.label_audit import audit, upheld
@@ -36,8 +36,8 @@ from spikecam_env.gap.observe.conditions import STEADY_KNOWN, Condition, conditi
 from spikecam_env.gap.observe.observation import observe
 from spikecam_env.gap.report.evidence import evidence_for
 from spikecam_env.gap.report.sentence import BOUNDS_OF_MAPS, sentence, unbounded, unfinished
-from spikecam_env.gap.result import BOUNDED_VERDICTS, Bound, Conclusion, Diagnosis, Findings
-from spikecam_env.gap.screen.templates import Templates
+from spikecam_env.gap.result import BOUND_KINDS, BOUNDED_VERDICTS, Bound, Conclusion, Diagnosis, Findings
+from spikecam_env.gap.screen.templates import Templates, shipped_templates
 from spikecam_env.gap.search.forward import forward_selection
 from spikecam_env.gap.search.round import Round
 from spikecam_env.gap.settings import DiagnosisSettings, checked_settings
@@ -67,7 +67,7 @@ def diagnose(
     twin_count: int = 12,
     templates: Templates | None = None,
     static_only: bool = False,
-    bounds: bool = False,
+    bounds: str = "linear",
     settings: DiagnosisSettings | None = None,
     progress: bool = True,
 ) -> Diagnosis:
@@ -84,7 +84,8 @@ def diagnose(
         twin_count: simulations of the campaign under the model.
         templates: of the candidates; default those that ship, others are simulated.
         static_only: whether to use only the static pixels of unknown scenes that move.
-        bounds: whether to simulate upper bounds of effects that were not found, by some 200 campaigns more.
+        bounds: upper bounds of effects that were not found: "linear", by linear response, without a simulation;
+            "simulated", by some 200 campaigns more; or "none".
         settings: the tuned numbers; default `DiagnosisSettings()`.
         progress: whether to name each stage as it begins.
 
@@ -92,8 +93,8 @@ def diagnose(
         The answer; `write` and `write_report` save it.
 
     Raises:
-        InputError: for an unreadable campaign, an unknown name, no effort, settings of another type, or too few static
-            recordings of known light to refit the unit by.
+        InputError: for an unreadable campaign, an unknown name, no effort, an unknown kind of bounds, settings of
+            another type, or too few static recordings of known light to refit the unit by.
 
     Example:
         >>> flats = [Dark(), *(Flat(radiance=level) for level in (0.1, 0.3))]
@@ -103,6 +104,8 @@ def diagnose(
         'No gap: these recordings and the model scsim agree to within the noise.'
     """
     Range(0, above=True, infinite=True).check(effort, "effort")
+    if bounds not in BOUND_KINDS:
+        raise unknown_name("kind of bounds", bounds, BOUND_KINDS)
     settings = checked_settings(settings)
     stages = Stages(progress)
     measured = campaign if isinstance(campaign, Campaign) else read_campaign(campaign)
@@ -115,7 +118,7 @@ def diagnose(
     else:
         with stages.timed("maps"):
             conclusion, evidence = diagnose_maps(measured, tested, names, seed, jobs, settings)
-            findings = findings_of(conclusion, [BOUNDS_OF_MAPS] if bounds else [], evidence=evidence)
+            findings = findings_of(conclusion, [BOUNDS_OF_MAPS] if bounds == "simulated" else [], evidence=evidence)
     model_name = tested.name if isinstance(model, SensorModel) else str(model)
     return Diagnosis(
         **vars(findings),
@@ -130,7 +133,7 @@ def diagnose(
         effect_files=files_of((*names, *(effect.name for effect in tested.effects))),
         static_only=static_only,
         settings=settings.changed(),
-        with_bounds=bounds,
+        bounds_kind=bounds,
     )
 
 
@@ -150,7 +153,7 @@ class DiagnosisRequest:
     twin_count: int
     static_only: bool = False
     settings: DiagnosisSettings = field(default_factory=DiagnosisSettings)
-    bounds: bool = False
+    bounds: str = "linear"
 
 
 def of_spikes(
@@ -183,10 +186,14 @@ def of_spikes(
         evidence = evidence_for(comparison, rounds, conclusion)
     bounded: list[Bound] = []
     not_bounded: list[tuple[str, str]] = []
-    if request.bounds and conclusion.verdict in BOUNDED_VERDICTS:
+    if request.bounds != "none" and conclusion.verdict in BOUNDED_VERDICTS:
         with stages.timed("bounds"):
-            standard = templates or templates_of(comparison.names, jobs=case.jobs, progress=stages.progress)
-            bounded, not_bounded = upper_bounds(case, comparison.model, null, values, comparison.names, standard)
+            if templates is None and request.bounds == "linear":
+                templates = shipped_templates()
+            templates = templates or templates_of(comparison.names, jobs=case.jobs, progress=stages.progress)
+            bounded, not_bounded = upper_bounds(
+                case, comparison.model, null, values, comparison.names, templates, request.bounds
+            )
     notes += [*unbounded(conclusion.verdict, request.bounds), *unfinished(case.budget)]
     return findings_of(
         conclusion,

@@ -160,7 +160,12 @@ def why_rejected(misfit: float, before: float, best: str, needed: float) -> str:
 
 @dataclass(frozen=True)
 class Bound:
-    """Upper bound (95 %, `verdict.bounds`) of an effect not found."""
+    """Upper bound (95 %, `verdict.bounds`) of an effect not found.
+
+    Example:
+        >>> Bound("light_flicker", "modulation", "relative", 0.0012, {"frequency_hz": 2000.0}, kind="linear").below
+        0.0012
+    """
 
     name: str
     parameter: str
@@ -168,10 +173,15 @@ class Bound:
     below: float
     at: dict[str, float] = field(default_factory=dict)
     """Its other parameters there, by name."""
+    kind: str = "simulated"
+    """`simulated` on these recordings, or `linear`: by linear response."""
 
+
+BOUND_KINDS = ("linear", "simulated", "none")
+"""Kinds of upper bounds that a diagnosis may state."""
 
 BOUNDED_VERDICTS = ("none", "parameter")
-"""Verdicts with upper bounds of the effects that were not found, with `bounds=True`."""
+"""Verdicts with upper bounds of the effects that were not found."""
 
 SIGNIFICANT = 0.05
 """Adjusted p-value below which a statistic is listed as one that differs."""
@@ -275,7 +285,7 @@ class Findings(Conclusion):
     evidence: Evidence | None = field(default=None, repr=False)
     """Recordings and twins that the report draws."""
     bounds: tuple[Bound, ...] = ()
-    """Upper bounds of effects that were not found; empty unless `diagnose` was called with bounds=True."""
+    """Upper bounds of effects that were not found; empty where something was, and with bounds="none"."""
     not_bounded: tuple[tuple[str, str], ...] = ()
     """(name, need) of effects that were not found and have no bound."""
     simulated: int = 0
@@ -320,8 +330,8 @@ class Diagnosis(Findings):
     """Whether moving pixels were left out."""
     settings: dict[str, Any] = field(default_factory=dict)
     """Those that differ from the defaults, by "stage.name"."""
-    with_bounds: bool = False
-    """Whether upper bounds were to be simulated."""
+    bounds_kind: str = "linear"
+    """One of `BOUND_KINDS`, as given to `diagnose`."""
 
     @property
     def static_share(self) -> float:

@@ -210,7 +210,7 @@ def none() -> Diagnosis:
               Bound("crosstalk", "kick", "thresholds", 0.0011))  # fmt: skip
     return _plain(
         "none", "No gap: these recordings and the model scsim agree to within the noise.", bounds=bounds,
-        with_bounds=True, not_bounded=(("blooming", "longer recordings"),),
+        bounds_kind="simulated", not_bounded=(("blooming", "longer recordings"),),
         gap=Gap(1.04, 1.04, 1.0, 0.0, {"flat-200": {"before": 1.02, "after": 1.02, "floor": 1.0},
                                        "bars-fast": {"before": 1.06, "after": 1.06, "floor": 1.0}}),
         evidence=evidence(None),

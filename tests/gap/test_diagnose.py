@@ -71,7 +71,12 @@ def named(lagging) -> Diagnosis:
 
 @pytest.fixture(scope="module")
 def nothing(clean) -> Diagnosis:
-    return asked(clean, candidates=BOUNDED, bounds=True)
+    return asked(clean, candidates=BOUNDED, bounds="simulated")
+
+
+@pytest.fixture(scope="module")
+def quick(clean) -> Diagnosis:
+    return asked(clean, candidates=(*BOUNDED, "photodiode_lag"))
 
 
 @pytest.fixture(scope="module")
@@ -121,20 +126,44 @@ def test_the_gap_of_nothing_is_chance(nothing):
     assert nothing.gap.before == nothing.gap.after
 
 
-def test_bounds_are_simulated_on_request_only(clean, nothing, tmp_path):
+def test_bounds_are_simulated_on_request_only(clean, nothing, quick):
     """Without them the answer is the same, costs no twin more than the null model's, and says how to have them."""
-    quick = asked(clean, candidates=BOUNDED)
-    quick.write(tmp_path)
-    said = json.loads((tmp_path / "diagnosis.json").read_text())
     print(quick.simulated, nothing.simulated)
     assert quick.verdict == nothing.verdict == "none" and quick.sentence == nothing.sentence
     assert quick.simulated == FEW * len(DESIGN) + FEW * sum(isinstance(p, (Step, Bars)) for p in DESIGN)
-    assert quick.simulated < nothing.simulated and "bounds" not in quick.stages
-    assert said["bounds"] == said["not_bounded"] == [] and any("--bounds" in note for note in said["data"])
+    assert quick.simulated < nothing.simulated
     assert nothing.bounds and not any("--bounds" in note for note in nothing.data)
     assert "--bounds" in summary(quick) and "--bounds" not in summary(nothing)
-    assert f"{command_of(quick)} --bounds" in report(quick) and command_of(nothing).endswith("--bounds")
-    assert "at most (95 %)" in report(nothing) and "at most (95 %)" not in report(quick)
+    assert f"{command_of(quick)} --bounds simulated" in report(quick)
+    assert command_of(nothing).endswith("--bounds simulated") and "--bounds" not in command_of(quick)
+
+
+def test_every_effect_that_is_not_found_has_a_bound_by_linear_response(quick, nothing, tmp_path):
+    """Its kind is marked in the file, on the page and in the terminal."""
+    quick.write(tmp_path)
+    said = json.loads((tmp_path / "diagnosis.json").read_text())
+    assert {b["name"]: b["kind"] for b in said["bounds"]} == dict.fromkeys((*BOUNDED, "photodiode_lag"), "linear")
+    assert said["not_bounded"] == [] and any("linear response" in note for note in said["data"])
+    assert {b.kind for b in nothing.bounds} == {"simulated"}
+    for shown in (report, summary):
+        assert "at most (95 %, by linear response)" in shown(quick) and "at most (95 %, simulated)" in shown(nothing)
+
+
+def test_bounds_may_be_left_out(clean, quick):
+    """The rest of the answer is the same."""
+    without = asked(clean, candidates=quick.candidates, bounds="none")
+    assert without.bounds == () == without.not_bounded and "bounds" not in without.stages
+    assert without.sentence == quick.sentence and command_of(without) == f"{command_of(quick)} --bounds none"
+    assert any("left out" in note for note in without.data) and "at most (95 %" not in report(without)
+
+
+@pytest.mark.parametrize("kind", [True, "exact", None])
+def test_an_unknown_kind_of_bounds_is_refused_in_one_line(kind, clean):
+    with pytest.raises(
+        InputError, match=r"unknown kind of bounds .*; choose one of linear, none, simulated"
+    ) as refused:
+        asked(clean, bounds=kind)
+    assert "\n" not in str(refused.value)
 
 
 def test_a_wrong_label_is_the_datas_fault(clean, tmp_path):
@@ -163,7 +192,7 @@ def test_an_effect_in_held_out_motion_alone_is_found_beside_one_of_the_others(tm
 
 def test_a_parameter_that_is_off_is_set_and_shrinks_the_gap(tmp_path):
     noisy = written(tmp_path / "noisy", MODEL.with_effect(effect("reset_noise", sigma_mV=19.1)))
-    found = asked(noisy, candidates=BOUNDED[:1], bounds=True)
+    found = asked(noisy, candidates=BOUNDED[:1], bounds="simulated")
     assert {b.name for b in found.bounds} == set(BOUNDED[:1])
     assert found.verdict == "parameter" and list(found.parameters) == ["reset_noise"]
     row = found.parameters["reset_noise"]
@@ -215,7 +244,7 @@ def test_labels_in_another_unit_change_no_bound_and_the_page_says_so(clean, noth
         with np.load(folder / f"{recording.name}.npz") as light:
             labels = {"frame": light["frame"], "radiance": light["radiance"] * np.float32(1000)}
         np.savez(folder / f"{recording.name}.npz", **labels)
-    found = asked(folder, candidates=BOUNDED, bounds=True)
+    found = asked(folder, candidates=BOUNDED, bounds="simulated")
     assert found.verdict == nothing.verdict and found.not_testable == nothing.not_testable
     assert [b.name for b in found.bounds] == [b.name for b in nothing.bounds] == sorted(BOUNDED)
     for one, other in zip(found.bounds, nothing.bounds, strict=True):
@@ -252,7 +281,7 @@ def test_only_candidates_are_tried(only):
 
 def test_effects_that_a_campaign_cannot_show_are_listed_with_their_needs(tmp_path):
     still = tuple(p for p in DESIGN if not isinstance(p, Step | Bars))
-    found = asked(written(tmp_path, MODEL, still), candidates=(*MOVED, "vignetting"), bounds=True)
+    found = asked(written(tmp_path, MODEL, still), candidates=(*MOVED, "vignetting"), bounds="simulated")
     needs = dict(found.not_testable)
     print(needs)
     assert found.verdict == "none" and [b.name for b in found.bounds] == ["vignetting"]

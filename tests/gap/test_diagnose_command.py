@@ -42,7 +42,7 @@ def test_it_writes_three_files_and_prints_verdict_parameters_and_gap(campaign: P
     wanted = {
         "campaign": campaign, "model": "scsim", "candidates": ("photodiode_lag", "dead_time"),
         "exclude": ("crosstalk",), "seed": 7, "jobs": 2, "effort": 200.0, "static_only": False,
-        "bounds": False, "settings": None, "progress": True,
+        "bounds": "linear", "settings": None, "progress": True,
     }  # fmt: skip
     assert wanted == made_up.ASKED
 

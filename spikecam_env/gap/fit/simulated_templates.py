@@ -44,6 +44,9 @@ def own_templates(case: Case, model: SensorModel, null: Null, names: Sequence[st
     return Templates(
         null.keys,
         null.noise,
+        null.mean,
+        case.shape,
+        {c.name: c.frames for c in case.conditions},
         {c.name: c.level for c in case.conditions},
         {c.name: "flat" for c in case.conditions},
         entries,

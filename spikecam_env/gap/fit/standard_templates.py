@@ -114,6 +114,9 @@ def templates_on(standard: Standard, entries: Sequence[Template], names: Sequenc
     return Templates(
         null.keys,
         null.noise,
+        null.mean,
+        case.shape,
+        {c.name: c.frames for c in case.conditions},
         {c.name: c.level for c in case.conditions},
         {c.name: c.kind for c in case.conditions},
         tuple(entries),

@@ -13,7 +13,7 @@ from typing import Any
 from spikecam_env.gap.report import plots, quantities, reproduce, table_rows, words
 from spikecam_env.gap.report.exhibits import LEAST_Z, by_z, exhibits
 from spikecam_env.gap.report.panels import shape_of
-from spikecam_env.gap.report.sentence import NO_BOUNDS, gap_line, heading
+from spikecam_env.gap.report.sentence import NOT_SIMULATED, gap_line, heading
 from spikecam_env.gap.result import CHANCE, Diagnosis
 from spikecam_env.page import TEMPLATES, picture
 from spikecam_env.whole import write_text_whole
@@ -54,7 +54,7 @@ def report(diagnosis: Diagnosis, campaign_command: str = "") -> str:
         "used": used,
         "held": [name for name in (d.gap.by_recording if d.gap else ()) if used.get(name, "holdout") == "holdout"],
         "commands": "\n".join(filter(None, (campaign_command, reproduce.command_of(d)))),
-        "bounds_command": reproduce.command_of(replace(d, with_bounds=True)) if NO_BOUNDS in d.data else "",
+        "bounds_command": simulated_bounds_command(d),
         "notes": [str.__str__(note) for note in d.data],
         "shown": shown or folded[:LEAST_SHOWN],
         "folded": folded if shown else folded[LEAST_SHOWN:],
@@ -67,6 +67,12 @@ def report(diagnosis: Diagnosis, campaign_command: str = "") -> str:
     }
     modules = {"plots": plots, "quantities": quantities, "reproduce": reproduce, "rows": table_rows, "words": words}
     return TEMPLATES.get_template("gap/report/report.html.jinja").render(context, **modules)
+
+
+def simulated_bounds_command(d: Diagnosis) -> str:
+    """The command that simulates upper bounds; empty where they are simulated, or something was found."""
+    not_simulated = d.bounds_kind in NOT_SIMULATED and NOT_SIMULATED[d.bounds_kind] in d.data
+    return reproduce.command_of(replace(d, bounds_kind="simulated")) if not_simulated else ""
 
 
 def about(d: Diagnosis) -> str:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -103,6 +104,12 @@ def at_most(bound: Bound) -> str:
     value = bound.below * scale
     digit = 10.0 ** (math.floor(math.log10(value)) - 1) if value > 0 else 1.0
     return f"{math.ceil(value / digit - 1e-9) * digit:.4g} {unit}".rstrip()
+
+
+def bound_heading(bounds: Sequence[Bound]) -> str:
+    """The head of a column of bounds, with their kind."""
+    linear = any(b.kind == "linear" for b in bounds)
+    return f"at most (95 %, {'by linear response' if linear else 'simulated'})"
 
 
 def bounded_parameter(bound: Bound) -> str:

@@ -7,7 +7,7 @@ import shlex
 from importlib import metadata
 
 from spikecam_env.code_version import code_version
-from spikecam_env.gap.result import Diagnosis
+from spikecam_env.gap.result import BOUND_KINDS, Diagnosis
 from spikecam_env.gap.twins.budget import CAMPAIGNS
 from spikecam_env.version import __version__
 
@@ -38,8 +38,8 @@ def command_of(d: Diagnosis) -> str:
         words.append(f"--effort {d.effort:g}")
     if d.static_only:
         words.append("--static-only")
-    if d.with_bounds:
-        words.append("--bounds")
+    if d.bounds_kind != BOUND_KINDS[0]:
+        words.append(f"--bounds {d.bounds_kind}")
     if d.settings:
         words.append("--settings FILE")
     return " ".join(words)

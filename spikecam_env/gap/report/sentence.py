@@ -163,20 +163,25 @@ HARDLY_A_GAP = 1.2
 """Times its floor up to which a gap is hardly one, and no share of it is stated to be removed."""
 
 
-def unbounded(verdict: str, with_bounds: bool) -> list[str]:
+def unbounded(verdict: str, bounds: str) -> list[str]:
     """A note on upper bounds that a verdict could have, and that were not simulated; none for other verdicts."""
-    return [] if with_bounds or verdict not in BOUNDED_VERDICTS else [NO_BOUNDS]
+    return [NOT_SIMULATED[bounds]] if bounds in NOT_SIMULATED and verdict in BOUNDED_VERDICTS else []
 
 
-NO_BOUNDS = (
-    "Upper bounds of the effects that were not found are not simulated by default: `spikecam diagnose --bounds`, or "
-    "diagnose(..., bounds=True), adds them. They take some 200 campaigns."
+SIMULATED_INSTEAD = (
+    '`spikecam diagnose --bounds simulated`, or diagnose(..., bounds="simulated"), simulates every bound on these '
+    "recordings, by some 200 campaigns."
 )
-"""Why a diagnosis without effects has no bounds, and the option that adds them."""
+
+NOT_SIMULATED = {
+    "linear": f"Upper bounds of the effects that were not found are by linear response. {SIMULATED_INSTEAD}",
+    "none": f"Upper bounds of the effects that were not found were left out. {SIMULATED_INSTEAD}",
+}
+"""How the upper bounds of a diagnosis are to be read, by `BOUND_KINDS`, and the option that tests them."""
 
 
 BOUNDS_OF_MAPS = "Recordings that are rates only have no upper bounds: these need spikes."
-"""Why `--bounds` adds none."""
+"""Why `--bounds simulated` adds none."""
 
 
 def unfinished(effort: Budget) -> list[str]:

@@ -60,7 +60,7 @@ def screen(
     Returns:
         Candidates by the misfit that they would leave, the least first.
     """
-    at = _places(templates, conditions, null.keys)
+    at = places(templates, conditions, null.keys)
     d = in_noise(null, measured)
     best: dict[tuple[str, frozenset[Any]], Screened] = {}
     for entry in templates.entries:
@@ -123,7 +123,7 @@ def misfit_of(null: Null, left: Floats, wider: Floats) -> float:
     return loss(null, left / np.sqrt(wider)) + log_variance
 
 
-def _places(templates: Templates, conditions: Sequence[Condition], keys: Sequence[StatisticKey]) -> NDArray[np.int64]:
+def places(templates: Templates, conditions: Sequence[Condition], keys: Sequence[StatisticKey]) -> NDArray[np.int64]:
     """(S,) index of each statistic in the templates, by the recording of its kind whose level is nearest; -1: none."""
     nearest: dict[str, str] = {}
     for c in conditions:

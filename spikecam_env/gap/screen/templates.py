@@ -59,6 +59,12 @@ class Templates:
     """(S,) of the design's statistics."""
     noise: Floats
     """(S,) in which a shift is measured."""
+    mean: Floats
+    """(S,) mean of the null model, which shifts are from."""
+    shape: tuple[int, int]
+    """(rows, columns) of its array."""
+    frames: dict[str, int]
+    """Length of its recordings by name."""
     levels: dict[str, float]
     """Radiance of its recordings by name."""
     kinds: dict[str, str]
@@ -102,6 +108,8 @@ class _About(Declared):
     """The part of a file of templates beside arrays."""
 
     keys: list[Annotated[list[str], Field(min_length=3, max_length=3)]]
+    shape: Annotated[list[Annotated[int, Field(gt=0)]], Field(min_length=2, max_length=2)]
+    frames: dict[str, Annotated[int, Field(gt=0)]]
     levels: dict[str, float]
     kinds: dict[str, str]
     laws: dict[str, str]
@@ -120,15 +128,24 @@ def read_templates(path: Path) -> Templates:
     Raises:
         InputError: for any other file.
     """
-    arrays = read_arrays(path, ("about", "shift", "noise"))
+    arrays = read_arrays(path, ("about", "shift", "noise", "mean"))
     about = declared(_About, parse_json(str(arrays["about"]), str(path)), str(path))
     shifts = numbers(arrays["shift"], "shift", str(path)).astype(np.float64)
-    noise = numbers(arrays["noise"], "noise", str(path)).astype(np.float64)
-    if shifts.shape != (len(about.entries), len(about.keys)) or noise.shape != (len(about.keys),):
-        raise InputError(f"{path}: shift {shifts.shape} and noise {noise.shape} do not fit its entries and keys")
+    noise, mean = (numbers(arrays[of], of, str(path)).astype(np.float64) for of in ("noise", "mean"))
+    if shifts.shape != (len(about.entries), len(about.keys)) or {noise.shape, mean.shape} != {(len(about.keys),)}:
+        sizes = f"shift {shifts.shape}, noise {noise.shape} and mean {mean.shape}"
+        raise InputError(f"{path}: {sizes} do not fit its entries and keys")
     entries = (Template(**dict(e), shift=shift) for e, shift in zip(about.entries, shifts, strict=True))
     return Templates(
-        tuple(StatisticKey(*k) for k in about.keys), noise, about.levels, about.kinds, tuple(entries), about.laws
+        tuple(StatisticKey(*k) for k in about.keys),
+        noise,
+        mean,
+        (about.shape[0], about.shape[1]),
+        about.frames,
+        about.levels,
+        about.kinds,
+        tuple(entries),
+        about.laws,
     )
 
 
@@ -136,20 +153,24 @@ def save_templates(templates: Templates, path: Path) -> None:
     """Write them whole, as they are when they are `rounded`."""
     about: dict[str, Any] = {
         "keys": templates.keys,
+        "shape": templates.shape,
+        "frames": templates.frames,
         "levels": templates.levels,
         "kinds": templates.kinds,
         "laws": templates.laws,
         "entries": [{k: v for k, v in vars(e).items() if k != "shift"} for e in templates.entries],
     }
     shift = np.array([_halved(e.shift) for e in templates.entries]).reshape(-1, len(templates.keys))
+    noise, mean = (of.astype(np.float32) for of in (templates.noise, templates.mean))
     with whole_file(path) as beside, beside.open("wb") as file:
-        np.savez_compressed(file, about=json.dumps(about), shift=shift, noise=templates.noise.astype(np.float32))
+        np.savez_compressed(file, about=json.dumps(about), shift=shift, noise=noise, mean=mean)
 
 
 def rounded(templates: Templates) -> Templates:
-    """Templates as they are read again: shifts in half precision, noise in single."""
+    """Templates as they are read again: shifts in half precision, noise and mean in single."""
     entries = tuple(replace(e, shift=_halved(e.shift).astype(np.float64)) for e in templates.entries)
-    return replace(templates, noise=templates.noise.astype(np.float32).astype(np.float64), entries=entries)
+    noise, mean = (of.astype(np.float32).astype(np.float64) for of in (templates.noise, templates.mean))
+    return replace(templates, noise=noise, mean=mean, entries=entries)
 
 
 def _halved(shift: Floats) -> NDArray[np.float16]:

@@ -1,7 +1,7 @@
-"""Upper bounds: strengths of an effect that the campaign at hand refutes, by simulation.
+"""Upper bounds: strengths of an effect that the campaign at hand refutes.
 
-A strength is refuted where 95 of 100 campaigns with the effect would score higher (`score`) than the measurement did.
-The least that is refuted is the bound.
+A strength is refuted where 95 of 100 campaigns with the effect would score higher than the measurement did.  The least
+that is refuted is the bound.  Scores are by simulation of the effect (`score`), or by its template (`linear_response`).
 """
 
 from __future__ import annotations
@@ -19,11 +19,15 @@ from spikecam_env.gap.candidates.table import candidate
 from spikecam_env.gap.compare.distance import SHOWS
 from spikecam_env.gap.compare.prediction import Null
 from spikecam_env.gap.fit.candidate import MOST_TRIES
+from spikecam_env.gap.fit.simulated_templates import template_parameters
+from spikecam_env.gap.fit.standard_templates import is_lacking
 from spikecam_env.gap.result import Bound
-from spikecam_env.gap.screen.templates import Templates
+from spikecam_env.gap.screen.templates import Template, Templates
 from spikecam_env.gap.twins.case import Case
+from spikecam_env.gap.verdict.linear_response import TemplateProbe
 from spikecam_env.gap.verdict.score import (
     RULE_OF_THREE,
+    EffectProbe,
     Parameters,
     Score,
     TwinProbe,
@@ -43,13 +47,19 @@ OVERSHOOT = 1.2
 LARGEST_SCALING = 40.0
 """Factor by which statistics are made larger or smaller at once, on the way to a score."""
 
-LONGER_RECORDINGS = "longer recordings, or more of them; in these it hardly shows"
 MORE_EFFORT = "a larger --effort: the budget was spent"
+NO_TEMPLATE = "--bounds simulated: there is no template of it on these recordings"
 """Needed for a bound."""
 
 
 def bounds(
-    case: Case, model: SensorModel, null: Null, measured: Floats, names: Sequence[str], templates: Templates
+    case: Case,
+    model: SensorModel,
+    null: Null,
+    measured: Floats,
+    names: Sequence[str],
+    templates: Templates,
+    kind: str = "simulated",
 ) -> tuple[list[Bound], list[tuple[str, str]]]:
     """Upper bounds of effects that were not found.
 
@@ -57,34 +67,50 @@ def bounds(
     of its size.
 
     Args:
+        case: the measurement.
         model: the model that explains it.
         null: the prediction of that model.
         measured: (S,) statistics.
         names: names of the effects.
-        templates: strengths to begin from.
+        templates: of the effects; their strengths are those to begin from.
+        kind: simulated, or linear: by templates of the present laws, for campaigns with known light.
 
     Returns:
         (bounds; names of effects without a bound, each with the means to get one).
     """
-    if case.scenes_only:
-        case = replace(case, base=unit_under(case, model))
-    starts = [(e.name, p) for e in templates.weakest if e.name in names for p in _both_signs(e.name, e.parameters)]
-    by_name = dict.fromkeys(name for name, _ in starts)
-    if not case.budget.allows("upper bounds", case.settings.bounding.campaigns * len(case.conditions)):
+    lacking = [n for n in names if kind == "linear" and template_parameters(n) and not _is_linear(case, templates, n)]
+    starts = [
+        (e, p)
+        for e in templates.weakest
+        if e.name in names and e.name not in lacking
+        for p in _both_signs(e.name, e.parameters)
+    ]
+    by_name = dict.fromkeys(e.name for e, _ in starts)
+    expense = case.settings.bounding.campaigns * len(case.conditions)
+    if kind == "simulated" and not case.budget.allows("upper bounds", expense):
         return [], [(name, MORE_EFFORT) for name in by_name]
+    if case.scenes_only and starts:
+        case = replace(case, base=unit_under(case, model))
 
-    def scored(start: tuple[str, Parameters]) -> ScoredShape:
-        name, parameters = start
-        of_units = candidate(name).is_pattern
-        probe = UnitProbe(case, model, null, name) if of_units else TwinProbe(case, model, null, measured, name)
-        return scored_shape(probe, measured, parameters)
+    def scored(start: tuple[Template, Parameters]) -> ScoredShape:
+        entry, parameters = start
+        if kind == "linear":
+            return scored_shape(TemplateProbe(case, model, null, templates, entry), measured, parameters)
+        of_units = candidate(entry.name).is_pattern
+        probe = UnitProbe if of_units else partial(TwinProbe, measured=measured)
+        return scored_shape(probe(case, model, null, name=entry.name), measured, parameters)
 
     with ThreadPoolExecutor(case.jobs) as pool:
         shapes = list(pool.map(scored, starts))
         worst = [max((k for k in shapes if k.probe.name == name), key=lambda k: k.expected) for name in by_name]
-        each = list(pool.map(partial(bound_of, measured), worst))
+        each = [*pool.map(partial(bound_of, measured), worst), *((name, NO_TEMPLATE) for name in lacking)]
     known = [bound for bound in each if isinstance(bound, Bound)]
     return sorted(known, key=lambda b: b.name), sorted(b for b in each if not isinstance(b, Bound))
+
+
+def _is_linear(case: Case, templates: Templates, name: str) -> bool:
+    """Whether a template of an effect's present law says how statistics of a case respond to it."""
+    return not case.scenes_only and not is_lacking(name, templates)
 
 
 def _both_signs(name: str, parameters: Parameters) -> list[Parameters]:
@@ -96,7 +122,7 @@ def _both_signs(name: str, parameters: Parameters) -> list[Parameters]:
 class ScoredShape:
     """A candidate of one shape with its score."""
 
-    probe: TwinProbe | UnitProbe
+    probe: EffectProbe
     score: Score | None
     """None where the effect does not show."""
     excess: float
@@ -112,7 +138,7 @@ class ScoredShape:
         return float(abs(self.score.parameters[strength_of(self.probe.name)]) * factor)
 
 
-def scored_shape(probe: TwinProbe | UnitProbe, measured: Floats, start: Parameters) -> ScoredShape:
+def scored_shape(probe: EffectProbe, measured: Floats, start: Parameters) -> ScoredShape:
     """A candidate at a strength where it shows well, from a start."""
     name, score = probe.name, None
     power = power_of(name)
@@ -137,20 +163,19 @@ def excess_of(score: Score | None, measured: Floats) -> float:
 def bound_of(measured: Floats, shape: ScoredShape) -> Bound | tuple[str, str]:
     """The least refuted strength above which no tested strength is open; without one (name, the means to get one)."""
     probe, name, key = shape.probe, shape.probe.name, strength_of(shape.probe.name)
-    resolution = probe.settings.bounding.resolution
     if shape.score is None or not np.isfinite(shape.expected) or probe.events(shape.score.parameters) <= 0:
-        return name, LONGER_RECORDINGS
+        return name, probe.needed
     score = probe.refined(shape.score)
     excess = excess_of(score, measured)
     at = first_strength(shape)
     least, most_open = np.inf, 0.0
-    for _ in range(MOST_TRIES):
+    for _ in range(probe.most_tests):
         size, test = abs(at[key]), probe.test(score, at)
         wanted = excess + test.quantile * test.sd
         ratio = float(np.clip(wanted / max(test.excess, 0.1 * wanted), 0.1, 10.0)) ** (1 / power_of(name))
         if test.refuted_by(excess):
             least = size
-            if ratio > resolution or most_open > resolution * size:
+            if ratio > probe.resolution or most_open > probe.resolution * size:
                 break
         else:
             most_open = size
@@ -161,10 +186,11 @@ def bound_of(measured: Floats, shape: ScoredShape) -> Bound | tuple[str, str]:
         if following_at == at:
             break
         at = following_at
-    if not np.isfinite(least):
-        return name, LONGER_RECORDINGS
+    below = probe.safety * float(least)
+    if not np.isfinite(below) or bounded(name, {key: below})[key] < below:
+        return name, probe.needed
     unit = CATALOGUE[name].__dataclass_fields__[key].metadata["unit"]
-    return Bound(name, key, unit, float(least), {k: v for k, v in at.items() if k != key})
+    return Bound(name, key, unit, below, {k: v for k, v in at.items() if k != key}, probe.kind)
 
 
 def first_strength(shape: ScoredShape) -> Parameters:

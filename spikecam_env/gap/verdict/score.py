@@ -21,6 +21,7 @@ from spikecam_env.gap.candidates.table import candidate, expected_events
 from spikecam_env.gap.compare.distance import CLEAR, in_noise
 from spikecam_env.gap.compare.prediction import Null, Prediction, pair_noise_share, pooled
 from spikecam_env.gap.compare.step import is_clear
+from spikecam_env.gap.fit.candidate import MOST_TRIES
 from spikecam_env.gap.fit.gauss_newton import at_settled_unit
 from spikecam_env.gap.fit.predict import predict_by_twins, with_drawn_pattern
 from spikecam_env.gap.fit.recordings import OF_RANDOM_COURSE, recordings_affected, twins_of
@@ -102,15 +103,37 @@ class StrengthTest:
 
 
 class EffectProbe:
-    """A candidate on the campaign at hand."""
+    """A candidate on the campaign at hand, by simulation."""
+
+    kind = "simulated"
+    """`Bound.kind`."""
+    needed = "longer recordings, or more of them; in these it hardly shows"
+    """Needed for a bound where there is none."""
+    most_tests = MOST_TRIES
+    """Strengths that are tested at most."""
+    safety = 1.0
+    """Factor on the least strength that is refuted."""
 
     def __init__(self, case: Case, model: SensorModel, null: Null, name: str):
         self.case, self.model, self.null, self.name = case, model, null, name
         self.settings = case.settings
+        self.resolution = case.settings.bounding.resolution
 
     def events(self, parameters: Parameters) -> float:
         """Expected number of events of an effect of single events, infinite elsewhere."""
         return expected_events(self.name, parameters, self.case.conditions, self.case.observations)
+
+    def score(self, parameters: Parameters) -> Score | None:
+        """The score by the statistics that the effect changes; None where it changes none."""
+        raise NotImplementedError
+
+    def refined(self, score: Score) -> Score:
+        """A score whose statistics are no chance."""
+        return score
+
+    def test(self, score: Score, parameters: Parameters) -> StrengthTest:
+        """Scores of campaigns with the effect at a strength."""
+        raise NotImplementedError
 
     @staticmethod
     def score_variance(score: Score, scores: Floats, excess: float, events: float) -> float:
@@ -216,10 +239,6 @@ class UnitProbe(EffectProbe):
         units = self._units(with_effect(self.model, self.name, parameters))
         change = np.nan_to_num((units - self.without).mean(axis=0))
         return linear(self.null, change, self.without, parameters)
-
-    def refined(self, score: Score) -> Score:
-        """The score itself: units are many."""
-        return score
 
     def test(self, score: Score, parameters: Parameters) -> StrengthTest:
         """Scores of units with the effect at a strength."""

@@ -47,7 +47,7 @@ def campaign_of(folder: Path, *effects: Effect, without: tuple[str, ...] = (), s
 def test_a_unit_of_the_model_is_not_off_whatever_its_spreads(tmp_path: Path) -> None:
     wider = SCSIM.with_effect(effect("conversion_gain_spread", sigma=0.08)).effects
     for name, effects in (("nominal", ()), ("wider", wider)):
-        found = diagnose(campaign_of(tmp_path / name, *effects), "scsim", bounds=True, progress=False)
+        found = diagnose(campaign_of(tmp_path / name, *effects), "scsim", bounds="simulated", progress=False)
         worst = max(abs(s.z) for s in found.statistics)
         print(f"{name}: {found.verdict}, gap {found.gap.before:.2f}; at worst {worst:.1f}")
         assert found.verdict == "none" and not found.parameters

@@ -9,6 +9,7 @@ from small import MODEL, effect
 
 from spikecam_env.gap import Bars, Dark, Flat
 from spikecam_env.gap.baseline.null_model import model_null
+from spikecam_env.gap.candidates.table import candidate
 from spikecam_env.gap.compare.prediction import values_of
 from spikecam_env.gap.observe.conditions import planned_conditions
 from spikecam_env.gap.observe.observation import observe
@@ -40,12 +41,19 @@ def recorded(*effects, camera: int = 1) -> Case:
     return case_of(SHAPE, CONDITIONS, seen, seed=camera)
 
 
-def bounds_of(case: Case, names) -> dict[str, Bound]:
+def bounds_of(case: Case, names, kind: str = "simulated") -> dict[str, Bound]:
     null = model_null(case, MODEL, 8)
-    found, _ = bounds(case, MODEL, null, values_of(case.bank, null.keys), names, shipped_templates())
+    found, _ = bounds(case, MODEL, null, values_of(case.bank, null.keys), names, shipped_templates(), kind)
     for b in found:
         print(b)
     return {b.name: b for b in found}
+
+
+def chances_of(name: str) -> float:
+    """Frames of pixels, spikes or pixels that an effect of single events may change."""
+    seen = recorded().observations[:4]
+    frames, spikes = sum(o.times.count.size * o.frames for o in seen), sum(o.times.count.sum() for o in seen)
+    return {"spurious_spikes": frames, "missed_spikes": spikes}.get(name, SHAPE[0] * SHAPE[1])
 
 
 @pytest.fixture(scope="module")
@@ -57,11 +65,7 @@ def clean() -> dict[str, Bound]:
 @pytest.mark.parametrize("name", COUNTED)
 def test_no_bound_of_what_is_counted_lets_expect_fewer_than_three(name, clean):
     """Of events at a rate p, one campaign of N chances in twenty has none where p N = 3.0 (the rule of three)."""
-    case, bound = recorded(), clean[name]
-    chances = {
-        "spurious_spikes": sum(o.times.count.size * o.frames for o in case.observations[:4]),
-        "missed_spikes": sum(o.times.count.sum() for o in case.observations[:4]),
-    }.get(name, SHAPE[0] * SHAPE[1])
+    bound, chances = clean[name], chances_of(name)
     print(f"{bound.below * chances:.1f} of {chances}")
     assert 3.0 < bound.below * chances < 60.0
 
@@ -81,6 +85,59 @@ def test_an_effect_at_its_bound_is_not_excluded(name, clean):
     for camera in (3, 4):
         found = bounds_of(recorded(hidden, camera=camera), [name])
         assert name not in found or found[name].below >= clean[name].below
+
+
+RESPONDING = ("dead_time", "frame_threshold_noise", "row_temporal_noise", "crosstalk", "row_fixed_pattern",
+              "supply_ripple")  # fmt: skip
+"""Effects on means, on logarithms of powers and on lines, of either sign, and of the fixed pattern."""
+
+
+@pytest.fixture(scope="module")
+def linear() -> dict[str, Bound]:
+    return bounds_of(recorded(), (*COUNTED, *RESPONDING), "linear")
+
+
+def test_every_effect_has_a_bound_by_linear_response_without_a_simulation(linear):
+    """The templates are of seven times as many pixels, and of ten times as many frames."""
+    assert linear.keys() == {*COUNTED, *RESPONDING} and {b.kind for b in linear.values()} == {"linear"}
+    case = recorded()
+    null, before = model_null(case, MODEL, 8), case.budget.simulated
+    bounds(case, MODEL, null, values_of(case.bank, null.keys), RESPONDING, shipped_templates(), "linear")
+    assert case.budget.simulated == before
+
+
+@pytest.mark.parametrize("name", COUNTED)
+def test_no_linear_bound_of_what_is_counted_lets_expect_fewer_than_three(name, linear):
+    """As of simulated ones: of events at a rate p, one campaign of N chances in twenty has none where p N = 3.0."""
+    assert linear[name].below * chances_of(name) > 3.0
+
+
+@pytest.mark.parametrize("name", RESPONDING)
+def test_an_effect_at_its_linear_bound_is_not_excluded(name, linear):
+    """In two other cameras; of either sign, in both."""
+    bound = linear[name]
+    for camera, sign in ((3, 1), (4, -1 if candidate(name).may_be_negative else 1)):
+        hidden = effect(name, **{bound.parameter: sign * bound.below, **bound.at})
+        found = bounds_of(recorded(hidden, camera=camera), [name], "linear")
+        assert name not in found or found[name].below >= bound.below
+
+
+@pytest.mark.slow
+def test_a_linear_bound_is_of_the_size_of_the_simulated_one(clean, linear):
+    """At most three times as large, and no less than a third."""
+    for name in (*COUNTED, "frame_threshold_noise"):
+        print(name, ratio := linear[name].below / clean[name].below)
+        assert 1 / 3 < ratio < 3
+
+
+def test_an_effect_whose_template_is_of_another_law_has_no_linear_bound():
+    """What would give one is said."""
+    case = recorded()
+    null = model_null(case, MODEL, 6)
+    unlike = replace(shipped_templates(), laws={})
+    found, open_ = bounds(case, MODEL, null, null.mean, ["dead_time", "vignetting"], unlike, "linear")
+    assert found == [] and dict(open_).keys() == {"dead_time", "vignetting"}
+    assert all("--bounds simulated" in needs for _, needs in open_)
 
 
 def test_what_these_recordings_would_not_show_at_its_strongest_has_no_bound():
