@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 import sys
 from pathlib import Path
+from typing import Any
 
 import pytest
 from small import MODEL, effect
@@ -22,12 +23,12 @@ def campaign(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
-def diagnosed(folder: Path, **options) -> None:
+def diagnosed(folder: Path, **options: Any) -> None:
     diagnose(folder, "scsim", candidates=["dead_time"], twin_count=4, effort=40, **options)
 
 
 def test_on_a_terminal_a_bar_has_stage_effect_share_of_the_budget_and_time_left(
-    campaign: Path, capsys, monkeypatch
+    campaign: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     for stream in (sys.stdout, sys.stderr):
         monkeypatch.setattr(stream, "isatty", lambda: True)
@@ -44,7 +45,7 @@ def test_on_a_terminal_a_bar_has_stage_effect_share_of_the_budget_and_time_left(
     assert shares == sorted(shares) and shares[0] == 0 < shares[-1]
 
 
-def test_elsewhere_each_stage_is_a_line(campaign: Path, capsys) -> None:
+def test_elsewhere_each_stage_is_a_line(campaign: Path, capsys: pytest.CaptureFixture[str]) -> None:
     diagnosed(campaign)
     printed = capsys.readouterr()
     assert [line for line in printed.out.splitlines() if line in ("read ...", "twins ...", "verdict ...")] == [
@@ -53,7 +54,9 @@ def test_elsewhere_each_stage_is_a_line(campaign: Path, capsys) -> None:
     assert "budget" not in printed.out + printed.err
 
 
-def test_without_progress_nothing_is_printed(campaign: Path, capsys, monkeypatch) -> None:
+def test_without_progress_nothing_is_printed(
+    campaign: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
     for stream in (sys.stdout, sys.stderr):
         monkeypatch.setattr(stream, "isatty", lambda: True)
     diagnosed(campaign, progress=False)

@@ -772,9 +772,9 @@ def crossing_of(x: Floats, o: int, j: int, since: float, p: int, references: Ref
     still, columns, at, waves, field, grains_per_mV, loads = references
     if still:
         gained, limit = x[o + _ARRIVES + j], x[o + _LIMIT + j]
-        return between(x[o + _HELD + j] - gained, gained, since, 0.0, 1.0, limit, limit)  # type: ignore[no-any-return]
+        return between(x[o + _HELD + j] - gained, gained, since, 0.0, 1.0, limit, limit)
     nodes, factor, common, of_pixel = pixel_law(p, columns, at, waves, field, grains_per_mV, loads)
-    return next_crossing(x, o, j, since, nodes, factor, common, of_pixel)  # type: ignore[no-any-return]
+    return next_crossing(x, o, j, since, nodes, factor, common, of_pixel)
 
 
 @njit(inline="always")
