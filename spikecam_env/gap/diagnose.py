@@ -8,14 +8,10 @@ the search, with the exceptions of `search`; the gate is on all, and the gap on 
 
 from __future__ import annotations
 
-import time
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
-
-from tqdm import tqdm
 
 from spikecam_env.campaign.reading import Campaign, read_campaign
 from spikecam_env.errors import InputError, unknown_name
@@ -41,6 +37,7 @@ from spikecam_env.gap.screen.templates import Templates, shipped_templates
 from spikecam_env.gap.search.forward import forward_selection
 from spikecam_env.gap.search.round import Round
 from spikecam_env.gap.settings import DiagnosisSettings, checked_settings
+from spikecam_env.gap.stages import Stages
 from spikecam_env.gap.twins.budget import CAMPAIGNS, Budget
 from spikecam_env.gap.twins.case import Case, case_of
 from spikecam_env.gap.twins.workers import sums_in_one_order
@@ -87,7 +84,8 @@ def diagnose(
         bounds: upper bounds of effects that were not found: "linear", by linear response, without a simulation;
             "simulated", by some 200 campaigns more; or "none".
         settings: the tuned numbers; default `DiagnosisSettings()`.
-        progress: whether to name each stage as it begins.
+        progress: whether to show, on a terminal, a bar of the budget with the effect at hand; elsewhere, a line as each
+            stage begins.
 
     Returns:
         The answer; `write` and `write_report` save it.
@@ -114,7 +112,8 @@ def diagnose(
     names = chosen(tested, candidates, exclude)
     if any(r.spikes for r in measured.recordings):
         request = DiagnosisRequest(tuple(names), seed, jobs, effort, twin_count, static_only, settings, bounds)
-        findings = of_spikes(measured, tested, request, templates, stages)
+        with stages.shown(effort):
+            findings = of_spikes(measured, tested, request, templates, stages)
     else:
         with stages.timed("maps"):
             conclusion, evidence = diagnose_maps(measured, tested, names, seed, jobs, settings)
@@ -276,6 +275,7 @@ def comparison_of(case: Case, tested: SensorModel, request: DiagnosisRequest, st
         case = trimmed(case, contradictions)
         limit = request.effort * len(case.conditions)
         case = replace(case, budget=Budget(limit, verdict_known=bool(contradictions)))
+        stages.follow(case.budget, len(case.conditions))
     names, not_testable = testable(request.names, case.conditions)
     lacking = missing_effects(case, tested, names)
     model = with_missing(tested, lacking)
@@ -314,20 +314,3 @@ def templates_for(comparison: Comparison, progress: bool) -> Templates:
     if case.scenes_only:
         return own_templates(replace(case, budget=Budget()), comparison.model, comparison.null, comparison.names)
     return templates_of(comparison.names, jobs=case.jobs, progress=progress)
-
-
-@dataclass
-class Stages:
-    """Seconds by stage, in the order in which they began; with progress, each is announced."""
-
-    progress: bool
-    seconds: dict[str, float] = field(default_factory=dict)
-
-    @contextmanager
-    def timed(self, name: str) -> Iterator[None]:
-        """Time a stage."""
-        if self.progress:
-            tqdm.write(f"{name} ...")
-        start = time.perf_counter()
-        yield
-        self.seconds[name] = self.seconds.get(name, 0.0) + time.perf_counter() - start

@@ -78,6 +78,7 @@ def fit(
         expected: (S,) change of the statistics at `start`; recordings without a change are not simulated.
         white: s^2 of the unit at `start`, over the refit's.
     """
+    problem.begin(f"fitting {name}")
     if candidate(name).is_pattern:
         return _fit_pattern(problem, name, start)
     if candidate(name).random_course:

@@ -30,6 +30,7 @@ def confirmed(problem: Problem, fitted: Fit, count: int | None = None) -> Fit:
     count = twins.to_confirm if count is None else count
     case, model, null = problem.case, problem.model, problem.null
     added = [e.name for e in fitted.model.effects if e not in model.effects]
+    problem.begin(f"confirming {', '.join(added or [fitted.name])}")
     effects = Candidates(tuple(added))
     predicted = null.prediction
     if not (added and effects.all_pattern and not set(added) & set(LINES)):

@@ -37,6 +37,7 @@ def refined_together(problem: Problem, fitted: Fit, names: Sequence[str]) -> tup
     Returns:
         (the fit, errors of its parameters, whether all recordings were needed).
     """
+    problem.begin(f"refining {', '.join(names)}")
     everywhere = problem.fitted_to_all
     refined, errors, own2 = _refined(problem, fitted, names)
     error = np.sqrt(refined.prediction.error**2 + own2 * np.isnan(problem.seen))

@@ -90,6 +90,10 @@ class Problem:
         change = everywhere if change is None else change
         return recordings_affected(self.case, names, self.null, self.seen, change)
 
+    def begin(self, work: str) -> None:
+        """Say what is simulated from now on (`Budget.begin`)."""
+        self.case.budget.begin(work)
+
     def allows(self, what: str, recordings: int = 0, *, needed: bool = False) -> bool:
         """Whether the budget allows a step (`Budget.allows`)."""
         return self.case.budget.allows(what, recordings, needed=needed)

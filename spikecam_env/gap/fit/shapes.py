@@ -44,6 +44,7 @@ def with_shapes_to_fit(problem: Problem, before: float, fits: Sequence[Fit]) -> 
 def with_fitted_shapes(problem: Problem, fitted: Fit, names: Sequence[str] = ()) -> Fit:
     """The fit with all fitted parameters of its candidate, or of the effects `names`, at their best."""
     names = names or (fitted.name,)
+    problem.begin(f"fitting the shape of {', '.join(names)}")
     only = problem.affected(names, fitted.prediction.mean - problem.null.mean)
     count = max(twins_of(name) for name in names)
 

@@ -25,7 +25,8 @@ def statistics(reading: CampaignReading, i: int) -> dict[str, float]:
 
 def _common_variance(lines: NDArray[np.int32], frames: int) -> float:
     whole = len(lines) // frames * frames
-    binned = lines[:whole].reshape(-1, frames, lines.shape[1]).sum(axis=1).astype(np.float64)
+    counts = lines[:whole].reshape(-1, frames, lines.shape[1]).sum(axis=1) if frames > 1 else lines
+    binned = counts.astype(np.float64)
     binned -= binned.mean(axis=0)
-    share = binned.mean(axis=1, keepdims=True)
-    return float(np.mean((binned - share) ** 2))
+    binned -= binned.mean(axis=1, keepdims=True)
+    return float(np.mean(np.square(binned, out=binned)))  # in place: fresh memory costs as much as the sums

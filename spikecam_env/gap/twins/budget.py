@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass, field
 
 CAMPAIGNS = 200.0
@@ -25,11 +26,29 @@ class Budget:
     """Steps that were skipped."""
     verdict_known: bool = False
     """Whether the verdict is decided, so that every further step is optional."""
+    work: str = ""
+    """What is simulated at the moment; of several threads, what began last."""
+    watcher: Callable[[], None] | None = None
+    """Called where `work` or the simulated recordings change."""
 
     @property
     def simulated(self) -> int:
         """Recordings so far."""
         return sum(self.spent)
+
+    def begin(self, work: str) -> None:
+        """Say what is simulated from now on."""
+        self.work = work
+        self._tell()
+
+    def spend(self, recordings: int) -> None:
+        """Count recordings that are simulated."""
+        self.spent.append(recordings)
+        self._tell()
+
+    def _tell(self) -> None:
+        if self.watcher is not None:
+            self.watcher()
 
     def allows(self, step: str, recordings: int = 0, *, needed: bool = False) -> bool:
         """Whether a step may begin; a refusal is noted.

@@ -125,7 +125,7 @@ def twins(
 
 def _twin(case: Case, model: SensorModel, base: BaseFit, seed: int, only: Sequence[int] | None, refit: BaseFit) -> Twin:
     which = range(len(case.conditions)) if only is None else only
-    case.budget.spent.append(len(which))
+    case.budget.spend(len(which))
     conditions = [case.conditions[i] for i in which]
     seen = [case.observations[i] for i in which]
     observations = simulate_seen(model, base, conditions, seen, case.shape, seed, which, case.jobs)

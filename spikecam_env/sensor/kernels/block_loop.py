@@ -49,8 +49,13 @@ Waves = tuple[Floats, Floats]
 """Factor and common [mV] at the nodes."""
 PixelNumbers = tuple[float, float, float]
 """Field [mV], grains_per_mV and load of a pixel."""
+References = tuple[bool, int, Floats, Waves, Pictures, Floats, Floats]
+"""Whether they stand still within the frame, pixels of a row, nodes, waves, field, grains_per_mV, loads of rows."""
 Wave = tuple[Floats, Floats, Floats, PixelNumbers]
 """Nodes, factor and common there, and the numbers of a pixel."""
+Links = NDArray[np.int32]
+Turns = tuple[Floats, Links]
+"""Numbers of the pixels for `fire_in_turn`; see `empty_turns`."""
 FewCharge = tuple[Floats, Floats, Floats, Floats, Floats]
 """Light, dark, their factors (n,), and extra dark charge (F, n) of the few pixels that have some."""
 
@@ -62,6 +67,12 @@ GROUP = 16
 
 FEWEST_FRAMES, SPARSE = 4, 0.5
 """Fewest frames of a block, and most spikes a pixel and frame, for which going from spike to spike is faster."""
+
+SLOTS = 2
+"""Slots of a frame for each pixel that fires in turn; with fewer, more of them share one."""
+
+FEW_WAIT = 16
+"""Most pixels of one slot that are searched for the next, each time; more go through a heap."""
 
 DRAWS, DECAY, CROSSING = 0x98AA1746, 0xB1E4BA7D, 0xD8275A88
 """Checksums of files compiled in: numba's cache sees a change of this file, not of those it imports from."""
@@ -85,6 +96,9 @@ _PIXEL, _FIRST, _SECOND, _FIRED, _DRAW, _DUE, _AWAKE, _AGAIN, _EXTRA = (
 )  # of 32 bits
 _HIT, _SEEN = (8 * 19 * BAND + row * BAND for row in range(2))  # of 8 bits
 _SCRATCH = 20 * BAND
+_MOMENT, _TAKEN, _LAST, _SHARE = range(4)  # of `Turns`
+_AFTER, _BEFORE, _PLACE = range(3)
+_NO_NOISE = -1.0  # instead of a share
 _NONE = 0xFFFFFFFF
 _LEAST = 1e-30  # divides where no charge arrives
 _INSIDE = BAND - 1  # masks a group's start: not negative, so that numba leaves wrapping indices out
@@ -297,7 +311,11 @@ def advance(
             if at_once != 0.0:
                 waves = swayed_factor[t * f_moves], swayed_common[t * c_moves]
                 loads = 1.0 + droop * activity
-                fire_in_turn(scratch, bits, lay, at, waves, fields, grains_per_mV, loads, at_once, reset, polynomial)
+                if t == 0:
+                    turns = empty_turns(scratch, lay, bits.size, at_once)
+                fire_in_turn(
+                    scratch, bits, lay, turns, at, waves, fields, grains_per_mV, loads, at_once, reset, polynomial
+                )
             if kick != 0.0:
                 for r in range(top, bottom):
                     count_neighbours(bits, r, columns, around)
@@ -576,6 +594,7 @@ def fire_in_turn(
     scratch: Floats,
     bits: Bytes,
     lines: Places,
+    turns: Turns,
     at: Floats,
     waves: Waves,
     field: Pictures,
@@ -589,73 +608,182 @@ def fire_in_turn(
 
     Args:
         lines: first pixel, width, band and place of each, (4, L) int64.
+        turns: of the pixels, all without a moment; left so.
         bits: (P,), overwritten.
     """
     x, words, hits = scratch.reshape(-1), scratch.reshape(-1).view(np.uint32), scratch.reshape(-1).view(np.uint8)
     rows, columns = loads.size, bits.size // loads.size
-    pieces = lines.shape[1] // rows
-    moments, takes, last = np.full(bits.size, NEVER), np.zeros(bits.size), np.full(bits.size, -1.0)
-    turns = [(0.0, 0) for _ in range(0)]
+    numbers, links = turns
+    references = stands_still(at, waves), columns, at, waves, field, grains_per_mV, loads
+    heap = [(0.0, 0) for _ in range(0)]
     bits[:] = 0
+    come = np.empty(bits.size, np.int32)
+    came = 0
     for line in range(lines.shape[1]):
-        p0, n, o, h0 = lines[:, line]
+        p0, n, o, h0 = lines[0, line], lines[1, line], lines[2, line], lines[3, line]
         for i in range(n):
-            if hits[8 * o + _HIT + h0 + i] == 0:
-                continue
+            come[came] = p0 + i
+            came += hits[8 * o + _HIT + h0 + i]
             hits[8 * o + _HIT + h0 + i] = 0
-            wave = pixel_law(p0 + i, columns, at, waves, field, grains_per_mV, loads)
-            moments[p0 + i], takes[p0 + i] = next_crossing(x, o, h0 + i, 0.0, wave[0], wave[1], wave[2], wave[3])
-            if moments[p0 + i] != NEVER:
-                heappush(turns, (moments[p0 + i], p0 + i))
-    while len(turns) > 0:
-        u, p = heappop(turns)
-        if u != moments[p]:
-            continue
-        row, column = p // columns, p % columns
-        o, j = place_of(row, column, pieces, lines)
-        wave = pixel_law(p, columns, at, waves, field, grains_per_mV, loads)
-        bits[p], hits[8 * o + _HIT + j], last[p] = 1, 1, u
-        spike(x, words, o, j, u, takes[p], wave, reset, polynomial)
-        moments[p] = NEVER
+    slots = min(SLOTS * (came + 1), len(links) - bits.size)
+    for p in come[:came]:
+        o, j = band_and_place(links[p, _PLACE])
+        numbers[p, _MOMENT], numbers[p, _TAKEN] = crossing_of(x, o, j, 0.0, p, references)
+        if numbers[p, _MOMENT] != NEVER:
+            wait(p, slot_of(numbers[p, _MOMENT], slots), links, bits.size)
+    now = 0
+    while True:
+        if len(heap) > 0:
+            u, p = heappop(heap)
+            if u != numbers[p, _MOMENT]:
+                continue
+        else:
+            while now < slots and links[bits.size + now, _AFTER] == bits.size + now:
+                now += 1
+            if now == slots:
+                break
+            p, others = first_of_ring(bits.size + now, numbers, links)
+            u = numbers[p, _MOMENT]
+            leave(p, links)
+            while others > FEW_WAIT and links[bits.size + now, _AFTER] != bits.size + now:
+                q = np.int64(links[bits.size + now, _AFTER])
+                leave(q, links)
+                heappush(heap, (numbers[q, _MOMENT], q))
+        row = p // columns
+        column = p - row * columns
+        o, j = band_and_place(links[p, _PLACE])
+        bits[p], hits[8 * o + _HIT + j], numbers[p, _LAST] = 1, 1, u
+        spike(x, words, o, j, u, numbers[p, _TAKEN], p, references, reset, polynomial)
+        moment = NEVER
         if x[o + _HELD + j] >= x[o + _LIMIT + j]:
-            moments[p], takes[p] = next_crossing(x, o, j, u, wave[0], wave[1], wave[2], wave[3])
-        if moments[p] != NEVER:
-            heappush(turns, (moments[p], p))
-        for down, right in ((-1, 0), (0, -1), (0, 1), (1, 0)):
+            moment, taken = crossing_of(x, o, j, u, p, references)
+            numbers[p, _TAKEN] = taken
+        numbers[p, _MOMENT] = moment
+        if moment != NEVER:
+            if len(heap) > 0 and slot_of(moment, slots) <= now:
+                heappush(heap, (moment, p))
+            else:
+                wait(p, max(slot_of(moment, slots), now), links, bits.size)
+        for side in range(4):
+            down, right = (side == 3) - (side == 0), (side == 2) - (side == 1)
             if row + down < 0 or row + down >= rows or column + right < 0 or column + right >= columns:
                 continue
             q = p + down * columns + right
-            o, j = place_of(row + down, column + right, pieces, lines)
+            o, j = band_and_place(links[q, _PLACE])
             held, phi, limit = x[o + _HELD + j], x[o + _PHI + j], x[o + _LIMIT + j]
-            kick_pixel(x, o, j, kick)
+            kick_pixel(x, o, j, kick, numbers[q, _SHARE])
             moment, taken = NEVER, 0.0
             if x[o + _HELD + j] >= x[o + _LIMIT + j]:
-                wave = pixel_law(q, columns, at, waves, field, grains_per_mV, loads)
-                moment, taken = next_crossing(x, o, j, u, wave[0], wave[1], wave[2], wave[3])
-            if moment == u and last[q] == u:
+                moment, taken = crossing_of(x, o, j, u, q, references)
+            if moment == u and bits[q] != 0 and numbers[q, _LAST] == u:
                 x[o + _HELD + j], x[o + _PHI + j], x[o + _LIMIT + j] = held, phi, limit
                 continue
-            moments[q], takes[q] = moment, taken
+            leave(q, links)
+            numbers[q, _MOMENT], numbers[q, _TAKEN] = moment, taken
             if moment != NEVER:
-                heappush(turns, (moment, q))
+                if len(heap) > 0 and slot_of(moment, slots) <= now:
+                    heappush(heap, (moment, q))
+                else:
+                    wait(q, max(slot_of(moment, slots), now), links, bits.size)
 
 
 @njit(inline="always")
-def kick_pixel(x: Floats, o: int, j: int, kick: float) -> None:
-    """Give a pixel charge [grains] that brings no shot noise: its threshold loses that of as many electrons."""
-    noise, jitter = x[o + _NOISE + j], x[o + _JITTER + j]
+def empty_turns(scratch: Floats, lines: Places, pixels: int, kick: float) -> Turns:
+    """Numbers of the pixels for `fire_in_turn`: nobody waits.
+
+    Pixels that wait are in rings by slots of the frame, so many that few share one.  Where many do, as those that are
+    at their limit when the frame begins, a heap puts them in order when it is the slot's turn.
+
+    Returns:
+        (P, 4) float64: moment, charge taken then, moment of the last spike, and share of its noise that a threshold
+            keeps at a kick; (P + slots, 3) int32: of each pixel, and then of each slot, the next in its ring and the
+            one before, itself where it is alone, and a pixel's place in the scratch.
+    """
+    x = scratch.reshape(-1)
+    numbers, links = np.zeros((pixels, 4)), np.empty((pixels + SLOTS * (pixels + 1), 3), np.int32)
+    numbers[:, _MOMENT] = NEVER
+    for p in range(len(links)):
+        links[p] = p
+    for line in range(lines.shape[1]):
+        for i in range(lines[1, line]):
+            p, at = lines[0, line] + i, lines[2, line] + lines[3, line] + i
+            noise, jitter = x[_NOISE + at], x[_JITTER + at]
+            links[p, _PLACE] = at
+            numbers[p, _SHARE] = _NO_NOISE
+            if noise > 0.0:
+                numbers[p, _SHARE] = math.sqrt(max(1.0 - kick / _G * noise / (noise + jitter), 0.0))
+    return numbers, links
+
+
+@njit(inline="always")
+def band_and_place(at: int) -> tuple[int, int]:
+    """Where a pixel's band begins in the scratch, and its place in that."""
+    band = np.int64(at) // _SCRATCH * _SCRATCH
+    return band, np.int64(at) - band
+
+
+@njit(inline="always")
+def slot_of(moment: float, slots: int) -> int:
+    """The slot of pixels that wait for such a moment, 0 .. 1."""
+    return min(int(moment * slots), slots - 1)
+
+
+@njit(inline="always")
+def wait(p: int, slot: int, links: Links, pixels: int) -> None:
+    """Put a pixel into the ring of a slot."""
+    head = pixels + slot
+    other = links[head, _AFTER]
+    links[p, _AFTER], links[p, _BEFORE] = other, head
+    links[other, _BEFORE], links[head, _AFTER] = p, p
+
+
+@njit(inline="always")
+def leave(p: int, links: Links) -> None:
+    """Take a pixel out of its ring."""
+    after, before = links[p, _AFTER], links[p, _BEFORE]
+    links[before, _AFTER], links[after, _BEFORE] = after, before
+    links[p, _AFTER], links[p, _BEFORE] = p, p
+
+
+@njit(inline="always")
+def first_of_ring(head: int, numbers: Floats, links: Links) -> tuple[int, int]:
+    """The pixel of the earliest moment in a slot's ring, of several the first; and the number of the others."""
+    p, others = np.int64(links[head, _AFTER]), 0
+    q = np.int64(links[p, _AFTER])
+    while q != head:
+        here, there = numbers[q, _MOMENT], numbers[p, _MOMENT]
+        p = q if here < there or (here == there and q < p) else p
+        others += 1
+        q = np.int64(links[q, _AFTER])
+    return p, others
+
+
+@njit(inline="always")
+def stands_still(at: Floats, waves: Waves) -> bool:
+    """Whether no reference moves within the frame, so that each pixel's limit is that of the frame."""
+    factor, common = waves
+    level = (factor[:, 0] == factor[:, 1]).all() and (common[:, 0] == common[:, 1]).all()
+    return bool(at.shape[1] == 2 and level)
+
+
+@njit(inline="always")
+def crossing_of(x: Floats, o: int, j: int, since: float, p: int, references: References) -> tuple[float, float]:
+    """`next_crossing` of pixel p, which is at place j of the scratch at o."""
+    still, columns, at, waves, field, grains_per_mV, loads = references
+    if still:
+        gained, limit = x[o + _ARRIVES + j], x[o + _LIMIT + j]
+        return between(x[o + _HELD + j] - gained, gained, since, 0.0, 1.0, limit, limit)
+    nodes, factor, common, of_pixel = pixel_law(p, columns, at, waves, field, grains_per_mV, loads)
+    return next_crossing(x, o, j, since, nodes, factor, common, of_pixel)
+
+
+@njit(inline="always")
+def kick_pixel(x: Floats, o: int, j: int, kick: float, share: float) -> None:
+    """Give a pixel charge [grains] that brings no shot noise: its threshold keeps a share of its noise."""
     x[o + _HELD + j] += kick
-    if noise > 0.0:
-        left = math.sqrt(max(1.0 - kick / _G * noise / (noise + jitter), 0.0))
-        x[o + _PHI + j] = _G + (x[o + _PHI + j] - _G) * left
+    if share != _NO_NOISE:
+        x[o + _PHI + j] = _G + (x[o + _PHI + j] - _G) * share
         x[o + _LIMIT + j] = max((x[o + _PHI + j] * x[o + _FACTOR + j] + x[o + _MOVED + j]) * x[o + _LOAD + j], _TRIPS)
-
-
-@njit(inline="always")
-def place_of(row: int, column: int, pieces: int, lines: Places) -> tuple[int, int]:
-    """A pixel's band, where its scratch begins, and its place in it."""
-    line = row * pieces + column // BAND
-    return lines[2, line], lines[3, line] + column % BAND
 
 
 @njit(inline="always")
@@ -719,7 +847,7 @@ def stands_at(moment: float, at: Floats, factor: Floats, common: Floats, of_pixe
     return low + (high - low) * share
 
 
-@njit(nogil=True, error_model="numpy", boundscheck=False)
+@njit(inline="always")
 def spike(
     x: Floats,
     words: Words,
@@ -727,14 +855,18 @@ def spike(
     j: int,
     moment: float,
     taken: float,
-    wave: Wave,
+    p: int,
+    references: References,
     reset: Reset,
     polynomial: Polynomial,
 ) -> None:
     """Reset a pixel that fires at that moment, and draw its next threshold; the law is that of `fire`."""
     per_root_rate, per_rate, kept = reset
-    at, factor, common, of_pixel = wave
-    w, stands = 2 * o, stands_at(moment, at, factor, common, of_pixel)
+    w, stands = 2 * o, x[o + _STANDS + j]
+    still, columns, at, waves, field, grains_per_mV, loads = references
+    if not still:
+        nodes, factor, common, of_pixel = pixel_law(p, columns, at, waves, field, grains_per_mV, loads)
+        stands = stands_at(moment, nodes, factor, common, of_pixel)
     over, electrons = on_grid(x[o + _HELD + j] - taken), stands * (1.0 / _G)
     if not (per_root_rate == 0.0 and per_rate == 0.0 and kept == 1.0):
         over, electrons = after_reset(over, x[o + _ARRIVES + j] / _G, stands, per_root_rate, per_rate, kept)
