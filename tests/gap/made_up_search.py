@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import small
 
+from spikecam_env.gap.compare.distance import robust_squares
 from spikecam_env.gap.compare.prediction import Null, Prediction
 from spikecam_env.gap.search.round import Round
 from spikecam_env.gap.verdict.degree import Explanation, explanation_of
@@ -23,9 +25,13 @@ def explained(
 ) -> Explanation:
     """The explanation of values (S,) by effects that change the statistics one after the other."""
     margins = margin if isinstance(margin, tuple) else (margin,) * len(changes)
-    model, unit, mean, rounds = small.MODEL, small.unit(), np.zeros(len(values)), []
+    model, mean, rounds = small.MODEL, np.zeros(len(values)), []
+
+    def turn(**own: Any) -> Round:
+        left = values - mean
+        return Round(model, small.unit(), given(mean), left, robust_squares(left), **own)
+
     for name, change, own in zip(("dead_time", "crosstalk"), changes, margins, strict=False):
-        best = SimpleNamespace(name=name)
-        rounds.append(Round(model, unit, given(mean), values - mean, 0.0, (best,), margin=own))  # type: ignore[arg-type]
+        rounds.append(turn(fits=(SimpleNamespace(name=name),), margin=own))
         model, mean = model.with_effect(CATALOGUE[name]()), mean + change
-    return explanation_of(null, values, [*rounds, Round(model, unit, given(mean), values - mean, 0.0)])
+    return explanation_of(null, values, [*rounds, turn()])

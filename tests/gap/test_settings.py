@@ -107,11 +107,12 @@ def degree(settings: DiagnosisSettings, elsewhere: float = 1e-4, missed: float =
         missed: squares in a statistic of its own place, over those of the effect's change.
         margin: of the name.
     """
-    keys = (*(StatisticKey("rates", "a", str(n)) for n in range(101)), StatisticKey("drift", "b", "0"))
-    null, change = known(settings, keys), np.r_[np.full(100, 1000.0), 0.0, 0.0]
-    squares = float(np.sum(change**2))
-    seen = change + np.r_[np.zeros(100), np.sqrt(missed * squares), np.sqrt(elsewhere / (1.0 - elsewhere) * squares)]
-    return explained(null, seen, change, margin=margin).degree
+    rates = (StatisticKey("rates", "a", str(n)) for n in range(101))
+    keys = (*rates, StatisticKey("pattern", "a", "0"), StatisticKey("drift", "b", "0"))
+    null, change = known(settings, keys), np.r_[np.full(100, 1000.0), 0.0, 20_000.0, 0.0]
+    of_rates, every = float(np.sum(change[:100] ** 2)), float(np.sum(change**2))
+    off = np.r_[np.zeros(100), np.sqrt(missed * of_rates), 0.0, np.sqrt(elsewhere / (1.0 - elsewhere) * every)]
+    return explained(null, change + off, change, margin=margin).degree
 
 
 DECISIONS = {

@@ -36,6 +36,10 @@ HALF = 0.5
 """Of the squares: the largest of several effects leaves no more than it explains.  Beside stand-ins it leaves a small
 share, `Concluding.most_left`: where they do not help, it may be one of them."""
 
+LEAST_SHARE = 0.1
+"""Of the misfit that all effects remove, removed by one that is named beside stand-ins: less may be details of the law
+that these stand for (part `tune` of the blind trial)."""
+
 
 @dataclass(frozen=True)
 class Explanation:
@@ -80,11 +84,19 @@ def explanation_of(null: Null, values: Floats, rounds: Sequence[Round]) -> Expla
     changes = squares_changed(null, rounds)
     there = sums_by_place(null.keys, np.where(off, after**2, 0.0)) / np.maximum(sums_by_place(null.keys, changes), 1.0)
     missed = float(np.max(np.where(shows_there(null, changes), there, 0.0)))
-    names = tuple(r.fits[0].name for r, _ in steps if r.margin >= limits.least_margin)
+    names = right_names(rounds, limits)
     stand_ins = tuple(name for name in every if name not in names)
     degree = LARGEST if stand_ins or left > limits.most_left else EXPLAINS_NEARLY_ALL
     explained = Explanation(degree, names, stand_ins, left, missed, min((r.margin for r, _ in steps), default=0.0))
     return replace(explained, degree=UNKNOWN) if explained.fault(limits) else explained
+
+
+def right_names(rounds: Sequence[Round], limits: Concluding) -> tuple[str, ...]:
+    """Effects with a margin; beside effects without one, those that also remove a share of the misfit."""
+    steps = adding(rounds)
+    having = [(r, after) for r, after in steps if r.margin >= limits.least_margin]
+    least = LEAST_SHARE * (rounds[0].misfit - rounds[-1].misfit) if len(having) < len(steps) else -np.inf
+    return tuple(r.fits[0].name for r, after in having if r.misfit - after.misfit >= least)
 
 
 def squares_changed(null: Null, rounds: Sequence[Round]) -> Floats:

@@ -64,6 +64,11 @@ def test_only_effects_with_a_margin_are_named_beside_others() -> None:
     margins = (0.9, 0.1)
     made = explained(one + other + beside(drift_dark=20.0), one, other, margin=margins)
     assert made.degree == LARGEST and made.names == ("dead_time",)
+    small = explained(one + other + beside(drift_dark=20.0), one, other, margin=margins[::-1])
+    assert small.names == ("crosstalk",), "both remove a share"
+    rest = beside(rates_dark=200.0)
+    detail = explained(one + rest + beside(drift_dark=20.0), one, rest, margin=margins[::-1])
+    assert detail.degree == UNKNOWN and detail.names == (), "a detail of the law that the stand-in stands for"
     worse = explained(one + other + off(drift_dark=100.0), one, other, margin=margins)
     assert worse.degree == UNKNOWN, "the stand-in does not help"
     assert explained(one + other, one, other, margin=margins).names == ("dead_time", "crosstalk"), "chance is left"
