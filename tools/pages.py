@@ -66,10 +66,11 @@ class RealPage:
 
     def is_fresh(self) -> bool:
         """Whether today's code made the page, by today's commands."""
-        if not self.page.with_suffix(".json").is_file():
+        beside = self.page.with_suffix(".json")
+        if not beside.is_file():
             return False
-        stated = StatedDiagnosis.read(self.page)
-        return (stated.version, stated.campaign_command) == (version_of_code(), self.campaign_command)
+        stated = json.loads(beside.read_text(encoding="utf-8"))
+        return (stated["version"], stated["campaign_command"]) == (version_of_code(), self.campaign_command)
 
     def make(self, data: Path, jobs: int) -> None:
         """Import, diagnose, write the page."""
