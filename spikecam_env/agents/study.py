@@ -186,7 +186,8 @@ def cases(
     """
     for sight in sights:
         if sight not in (*SIGHTS, *READY):
-            raise unknown_name("observation", sight, (*SIGHTS, *READY))
+            through = {f"{who}-{seen}": f"{who}-OBS" for who in CLASSICAL for seen in SIGHTS}
+            raise unknown_name("observation", sight, {through.get(name, name) for name in (*SIGHTS, *READY)})
     for task in tasks:
         _check_task(Study(task), sights, bool(levels or trained_levels), trained)
     for each in (*levels, *([trained_levels] if trained_levels else [])):

@@ -34,9 +34,9 @@ FRAMES = 1000
 FEW = 6
 """Twins, to be quick."""
 KEYS = {
-    "format": str, "verdict": str, "sentence": str, "effects": list, "unknown": (dict, type(None)),
-    "class": (dict, type(None)), "degree": (str, type(None)), "stand_ins": list,
-    "remainder": (dict, type(None)), "parameters": dict, "data": list,
+    "format": str, "verdict": str, "degree": (str, type(None)), "sentence": str, "effects": list, "stand_ins": list,
+    "unknown": (dict, type(None)), "class": (dict, type(None)), "remainder": (dict, type(None)), "parameters": dict,
+    "data": list,
     "gap": (dict, type(None)), "discrepancies": list, "not_testable": list, "bounds": list, "not_bounded": list,
     "motion": list, "static_share": float, "ranking": list,
     "model": str, "effect_files": list, "campaign": str,

@@ -74,8 +74,8 @@ def assert_the_same_from_the_cache(monkeypatch) -> None:
     assert len(read.entries) == len(made.entries) > 1
     for now, before in zip(read.entries, made.entries, strict=True):
         assert replace(now, shift=()) == replace(before, shift=()) and np.array_equal(now.shift, before.shift)
-    assert np.array_equal(read.noise, made.noise)
-    assert replace(read, entries=(), noise=()) == replace(made, entries=(), noise=())
+    assert np.array_equal(read.noise, made.noise) and np.array_equal(read.mean, made.mean)
+    assert replace(read, entries=(), noise=(), mean=()) == replace(made, entries=(), noise=(), mean=())
 
 
 def with_the_pages_code(name: str) -> None:
