@@ -152,7 +152,8 @@ def gap_line(gap: Gap) -> str:
     said = f"On the held-out recordings {off}; {chance}."
     if not math.isfinite(gap.removed) or gap.before <= HARDLY_A_GAP * gap.floor:
         return said
-    removed = f"{100 * min(gap.removed, 1.0):.0f} % of the gap is removed"
+    share = min(gap.removed, 1.0)
+    removed = f"{100 * share:.0f} % of the gap is removed" if share > 0 else "the gap is not smaller"
     return f"{said} With the patched model it is {three_digits(gap.after)}: {removed}."
 
 

@@ -94,6 +94,11 @@ def test_two_effects_are_named_together() -> None:
     assert "1.22 ms) and dead time (tau 1.02 us); adding them removes" in sentence_of(both)
 
 
+def test_a_patch_that_removes_nothing_is_not_said_to_remove_a_negative_share() -> None:
+    said = gap_line(Gap(2.4, 3.0, 1.0, -0.43, {}))
+    assert said.endswith("With the patched model it is 3: the gap is not smaller.")
+
+
 @pytest.mark.parametrize("before, stated", [(1.1, False), (1.3, True)])
 def test_a_removed_share_is_said_where_there_is_a_gap(before: float, stated: bool) -> None:
     assert ("is removed" in gap_line(Gap(before, 1.0, 1.0, 1.0, {}))) == stated
