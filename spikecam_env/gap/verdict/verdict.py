@@ -59,15 +59,16 @@ def conclude(comparison: Comparison, rounds: Sequence[Round], floor: float) -> C
     last = rounds[-1].prediction if rounds else null.prediction
     left = residual(null, comparison.values, last)
     found = kept(comparison, rounds)
-    explained = explanation_of(null, comparison.values, rounds) if rounds else Explanation(EXPLAINS_ALL)
-    is_clean = explained.degree == EXPLAINS_ALL or may_be_chance(comparison, found)
+    by_chance = not rounds or may_be_chance(comparison, found)
+    explained = Explanation(EXPLAINS_ALL) if by_chance else explanation_of(null, comparison.values, rounds)
+    is_clean = explained.degree == EXPLAINS_ALL
     off = parameters_off(comparison, rounds) if is_clean else {}
     verdict = verdict_of(comparison, rounds, found, explained.degree) or ("parameter" if off else "none")
     model = patched_model(comparison, rounds)
     return Conclusion(
         verdict=verdict,
         degree={"named": explained.degree, "class": explained.degree, "unknown": UNKNOWN}.get(verdict),
-        effects=() if verdict == "unknown" else named(comparison, rounds, found, explained),
+        effects=() if verdict == "unknown" else named(comparison, found, explained),
         stand_ins=tuple(f.name for f, _ in found if verdict == "unknown" or f.name not in explained.names),
         unknown=described(comparison, found, explained) if verdict == "unknown" else None,
         class_=tied(found) if verdict == "class" else None,
@@ -78,7 +79,7 @@ def conclude(comparison: Comparison, rounds: Sequence[Round], floor: float) -> C
         ranking=ranking(rounds, found, null.settings.deviance.accept),
         not_testable=comparison.not_testable,
         patched=with_strengths(model, off),
-        remainder=remainder_of(case, null, comparison.values, last) if verdict == "named" else None,
+        remainder=remainder_of(case, null, comparison.values, last) if verdict == "named" and not is_clean else None,
     )
 
 
@@ -223,12 +224,12 @@ def with_given_parameters(problem: Problem, tested: SensorModel, rounds: Sequenc
 
 
 def named(
-    comparison: Comparison, rounds: Sequence[Round], found: Sequence[tuple[Fit, Round]], explained: Explanation
+    comparison: Comparison, found: Sequence[tuple[Fit, Round]], explained: Explanation
 ) -> tuple[NamedEffect, ...]:
     """Effects that the refit found missing, if names are right, and those of the search that have a margin."""
     place, time = where(comparison.case), when(comparison.case)
     by_search = tuple(named_by_search(comparison, f, r, place, time) for f, r in found if f.name in explained.names)
-    if explained.degree != UNKNOWN or may_be_chance(comparison, found) or not rounds:
+    if explained.degree != UNKNOWN:
         return (*(named_by_refit(m) for m in comparison.missing), *by_search)
     return by_search
 

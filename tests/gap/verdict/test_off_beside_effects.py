@@ -7,14 +7,18 @@ from dataclasses import replace
 
 import numpy as np
 import small
+from scipy import stats
 from small import effect, recorded
 
+from spikecam_env.gap.baseline.missing_from_refit import Missing
 from spikecam_env.gap.baseline.off_nominal import OffNominal
 from spikecam_env.gap.compare.distance import residual
 from spikecam_env.gap.compare.prediction import Prediction, values_of
 from spikecam_env.gap.fit.candidate import Fit
 from spikecam_env.gap.search.round import Round
+from spikecam_env.gap.settings import DiagnosisSettings
 from spikecam_env.gap.verdict.comparison import Comparison
+from spikecam_env.gap.verdict.remainder import is_left
 from spikecam_env.gap.verdict.verdict import conclude
 
 LITTLE = 0.15
@@ -72,3 +76,20 @@ def test_nor_beside_what_several_names_explain():
 
 def test_one_that_the_effect_scatters_is_not():
     assert conclusion(read=100.0).parameters == {}
+
+
+def test_beside_an_effect_that_the_refit_names_a_weak_alarm_is_chance_and_leaves_no_remainder():
+    """A statistic is off by p = 0.004, beyond the gate, and the search kept nothing."""
+    null, case = small.null(), recorded()
+    count = len(null.keys)
+    least = int(np.argmax(null.freedom))
+    off = stats.t.isf(0.004 / count / 2, null.freedom[least]) * null.noise * (np.arange(count) == least)
+    values = null.mean + off
+    turn = Round(small.MODEL, case.base, null.prediction, residual(null, values, null.prediction), 900.0)
+    found = (Missing(effect("dark_current", mean_pA=0.4), 0.01),)
+    compared = Comparison(case, small.MODEL, small.MODEL, null, values, null.mean, found, OffNominal({}, case.base), ())
+    said = conclude(compared, [turn], floor=1.0)
+    print(compared.smallest_p, said.degree, said.remainder)
+    limits = DiagnosisSettings().judging
+    assert limits.chance_p < compared.smallest_p < limits.gate and is_left(null, values, null.prediction).any()
+    assert (said.verdict, said.degree, said.remainder) == ("named", "explains all", None)
