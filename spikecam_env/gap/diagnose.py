@@ -15,14 +15,15 @@ from typing import Any
 
 from spikecam_env.campaign.reading import Campaign, read_campaign
 from spikecam_env.errors import InputError, unknown_name
-from spikecam_env.gap.baseline.contradiction import Contradiction
 from spikecam_env.gap.baseline.halves_floor import floor_of_halves
-from spikecam_env.gap.baseline.label_audit import audit, upheld
 from spikecam_env.gap.baseline.missing_from_refit import missing_effects, with_missing
 from spikecam_env.gap.baseline.null_model import model_null
 from spikecam_env.gap.baseline.off_nominal import OffNominal, off_nominal
-from spikecam_env.gap.baseline.static_part import Observed, counted_pixels, without_motion
+from spikecam_env.gap.baseline.upheld_labels import upheld
 from spikecam_env.gap.candidates.table import chosen, testable
+from spikecam_env.gap.check.contradiction import Contradiction
+from spikecam_env.gap.check.label_audit import audit
+from spikecam_env.gap.check.static_part import Observed, counted_pixels, without_motion
 from spikecam_env.gap.compare.prediction import values_of
 from spikecam_env.gap.fit.problem import Problem
 from spikecam_env.gap.fit.simulated_templates import own_templates

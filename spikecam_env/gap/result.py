@@ -11,8 +11,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from spikecam_env.gap.baseline.motion import DetectedMotion
-from spikecam_env.gap.baseline.static_part import static_pixels
+from spikecam_env.gap.check.motion import DetectedMotion
+from spikecam_env.gap.check.static_part import static_pixels
 from spikecam_env.gap.observe.conditions import Condition
 from spikecam_env.gap.observe.observation import ObservedRecording
 from spikecam_env.gap.twins.budget import CAMPAIGNS

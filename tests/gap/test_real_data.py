@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from spikecam_env.gap import Label, import_campaign
-from spikecam_env.gap.baseline.motion import find_motion
 from spikecam_env.gap.baseline.null_model import model_null
+from spikecam_env.gap.check.motion import find_motion
 from spikecam_env.gap.compare.distance import adjusted, deviates
 from spikecam_env.gap.compare.prediction import values_of
 from spikecam_env.gap.diagnose import diagnose, observed, read_case

@@ -16,9 +16,9 @@ from scipy import stats
 from small import MODEL, unit
 
 from spikecam_env.errors import InputError
-from spikecam_env.gap.baseline import motion
 from spikecam_env.gap.baseline.alarm import is_discrepant
 from spikecam_env.gap.baseline.off_nominal import off_nominal
+from spikecam_env.gap.check import motion
 from spikecam_env.gap.compare.distance import is_significant
 from spikecam_env.gap.compare.prediction import Null
 from spikecam_env.gap.diagnose import diagnose, read_case

@@ -1,1 +1,1 @@
-"""Before a search: the null model, contradictions of the recordings, and effects that the refit shows to be missing."""
+"""Before a search: the null model, the alarm, and quantities that the refit shows to be missing or off nominal."""

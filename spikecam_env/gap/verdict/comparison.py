@@ -7,9 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from spikecam_env.gap.baseline.alarm import is_discrepant
-from spikecam_env.gap.baseline.contradiction import Contradiction
 from spikecam_env.gap.baseline.missing_from_refit import Missing
 from spikecam_env.gap.baseline.off_nominal import OffNominal
+from spikecam_env.gap.check.contradiction import Contradiction
 from spikecam_env.gap.compare.distance import adjusted, deviates, residual
 from spikecam_env.gap.compare.prediction import Null
 from spikecam_env.gap.fit.problem import values_to_fit

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from spikecam_env.gap.baseline.motion import DetectedMotion
-from spikecam_env.gap.baseline.static_part import ENOUGH_STATIC, static_pixels
+from spikecam_env.gap.check.motion import DetectedMotion
+from spikecam_env.gap.check.static_part import ENOUGH_STATIC, static_pixels
 from spikecam_env.gap.result import Conclusion
 from spikecam_env.sensor import SensorModel
 

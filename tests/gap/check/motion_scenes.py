@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from spikecam_env.gap.baseline.motion import DetectedMotion, find_motion
+from spikecam_env.gap.check.motion import DetectedMotion, find_motion
 from spikecam_env.gap.observe.conditions import Condition
 from spikecam_env.gap.observe.observation import observe
 from spikecam_env.sensor import Keyframes, SensorModel, SpikeSensor

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from spikecam_env.gap.baseline.contradiction import Contradiction
+from spikecam_env.gap.check.contradiction import Contradiction
 from spikecam_env.gap.compare.distance import SHOWS
 from spikecam_env.gap.observe.conditions import Condition
 from spikecam_env.gap.observe.observation import BIN, ObservedRecording

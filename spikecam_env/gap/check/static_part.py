@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from spikecam_env.campaign.reading import CampaignRecording
-from spikecam_env.gap.baseline.motion import DetectedMotion, find_motion
+from spikecam_env.gap.check.motion import DetectedMotion, find_motion
 from spikecam_env.gap.observe.conditions import Condition
 from spikecam_env.gap.observe.observation import ObservedRecording, observe
 from spikecam_env.gap.settings import DiagnosisSettings

@@ -10,9 +10,9 @@ import pytest
 from spikecam_env.campaign import read_campaign
 from spikecam_env.campaign.writing import finish_campaign, save_spikes
 from spikecam_env.errors import InputError
-from spikecam_env.gap.baseline.motion import find_motion
 from spikecam_env.gap.baseline.null_model import model_null
-from spikecam_env.gap.baseline.static_part import without_motion
+from spikecam_env.gap.check.motion import find_motion
+from spikecam_env.gap.check.static_part import without_motion
 from spikecam_env.gap.compare.distance import adjusted, deviates
 from spikecam_env.gap.compare.prediction import values_of
 from spikecam_env.gap.diagnose import case_of_observed, diagnose, observed, read_case
@@ -23,7 +23,7 @@ from spikecam_env.gap.settings import DiagnosisSettings
 from spikecam_env.gap.twins.unknown_scene import correction
 from spikecam_env.sensor import CATALOGUE, Keyframes, SensorModel, SpikeSensor
 from spikecam_env.streams import pack_frames
-from tests.gap.baseline.motion_scenes import CHANGES_IN_TIME, SHAPE, ball, drift, looked_at, picture, square
+from tests.gap.check.motion_scenes import CHANGES_IN_TIME, SHAPE, ball, drift, looked_at, picture, square
 
 FRAMES = 500
 SCSIM = SensorModel.preset("scsim")

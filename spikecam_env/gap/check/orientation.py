@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from spikecam_env.gap.baseline.contradiction import Contradiction
+from spikecam_env.gap.check.contradiction import Contradiction
 from spikecam_env.gap.statistics.film import refitted_film
 from spikecam_env.gap.twins.case import Case
 from spikecam_env.types import Floats

@@ -9,8 +9,9 @@ import pytest
 from small import FRAMES, MODEL, SHAPE, case_from, conditions, effect, recorded, spikes_of
 
 from spikecam_env.gap import write_campaign
-from spikecam_env.gap.baseline.label_audit import audit, upheld
-from spikecam_env.gap.baseline.label_audit import relabelled as labelled
+from spikecam_env.gap.baseline.upheld_labels import relabelled as labelled
+from spikecam_env.gap.baseline.upheld_labels import upheld
+from spikecam_env.gap.check.label_audit import audit
 from spikecam_env.gap.diagnose import read_case
 
 EFFECTS = [

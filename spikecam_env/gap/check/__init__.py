@@ -1,0 +1,1 @@
+"""Before any model: whether recordings are as their labels say.  Motion, levels, order, orientation, missing frames."""
