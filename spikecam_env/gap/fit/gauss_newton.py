@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from spikecam_env.gap.candidates.strength import bounded, with_effect
-from spikecam_env.gap.candidates.table import candidate
+from spikecam_env.gap.candidates.table import Candidates, candidate
 from spikecam_env.gap.compare.distance import APART, SHOWS
 from spikecam_env.gap.compare.prediction import Null, Prediction, own_variance
 from spikecam_env.gap.compare.step import change_of, step_of
@@ -77,6 +77,23 @@ class Descent:
     """(S, n) standard deviations of `columns`."""
     covariance: Floats
     """(n, n) covariance of the logarithms."""
+
+
+def probe_of(problem: Problem, names: Sequence[str], only: Sequence[int], count: int) -> Probe:
+    """The probe of effects: twins of some recordings, and drawn units where an effect changes the pattern.
+
+    Args:
+        names: of the effects.
+        only: recordings to simulate, by index; none where all effects change the pattern alone.
+        count: number of twins.
+    """
+    draws_units = Candidates(tuple(names)).any_pattern
+
+    def statistics(model: SensorModel, base: BaseFit) -> Prediction:
+        made = problem.predict(model, constrained_refit(model, base), count, only) if only else problem.null.prediction
+        return problem.with_pattern(model, made) if draws_units else made
+
+    return statistics
 
 
 def descend(

@@ -9,16 +9,14 @@ import numpy as np
 
 from spikecam_env.gap.candidates.table import Candidates, candidate
 from spikecam_env.gap.compare.distance import APART
-from spikecam_env.gap.compare.prediction import Prediction
 from spikecam_env.gap.fit.candidate import Fit
 from spikecam_env.gap.fit.confirm import confirmed
 from spikecam_env.gap.fit.coordinates import is_apart
-from spikecam_env.gap.fit.gauss_newton import WHITE, Probe, descend
+from spikecam_env.gap.fit.gauss_newton import WHITE, Probe, descend, probe_of
 from spikecam_env.gap.fit.last_step import Errors, Slopes, last_step
 from spikecam_env.gap.fit.problem import Problem
 from spikecam_env.gap.fit.recordings import twins_of, with_held_out
-from spikecam_env.gap.unit.refit import BaseFit, constrained_refit
-from spikecam_env.sensor import SensorModel
+from spikecam_env.gap.unit.refit import BaseFit
 from spikecam_env.types import Floats
 
 OWN_SHARE = 0.9
@@ -152,13 +150,5 @@ def agree(before: Fit, after: Fit, errors: Errors, apart: float) -> bool:
 
 
 def _probe(problem: Problem, fitted: Fit, names: Sequence[str]) -> Probe:
-    """Twins, and drawn units where an effect changes the pattern."""
-    only, count = simulated_for(problem, fitted, names)
-
-    def statistics(model: SensorModel, base: BaseFit) -> Prediction:
-        made = problem.null.prediction
-        if only:
-            made = problem.predict(model, constrained_refit(model, base), count, only)
-        return problem.with_pattern(model, made) if Candidates(tuple(names)).any_pattern else made
-
-    return statistics
+    """The probe of a fit's effects, on recordings held out as well."""
+    return probe_of(problem, names, *simulated_for(problem, fitted, names))

@@ -12,14 +12,11 @@ import numpy as np
 
 from spikecam_env.gap.candidates.table import candidate
 from spikecam_env.gap.compare.distance import is_significant
-from spikecam_env.gap.compare.prediction import Prediction
 from spikecam_env.gap.fit.candidate import Fit
 from spikecam_env.gap.fit.coordinates import error_of
-from spikecam_env.gap.fit.gauss_newton import COMPARED, Descent, Free, descend
+from spikecam_env.gap.fit.gauss_newton import COMPARED, Descent, Free, descend, probe_of
 from spikecam_env.gap.fit.problem import Problem
 from spikecam_env.gap.fit.recordings import twins_of
-from spikecam_env.gap.unit.refit import BaseFit, constrained_refit
-from spikecam_env.sensor import SensorModel
 
 WORTH = 0.5
 """Of what the best removes: less is not worth another fit, of a start, a shape, or a runner-up of an earlier effect."""
@@ -41,17 +38,13 @@ def with_shapes_to_fit(problem: Problem, before: float, fits: Sequence[Fit]) -> 
     return [f for f in fits if candidate(f.name).has_shapes and f.misfit < min(near, enough)]
 
 
-def with_fitted_shapes(problem: Problem, fitted: Fit, names: Sequence[str] = ()) -> Fit:
-    """The fit with all fitted parameters of its candidate, or of the effects `names`, at their best."""
-    names = names or (fitted.name,)
-    problem.begin(f"fitting the shape of {', '.join(names)}")
-    only = problem.affected(names, fitted.prediction.mean - problem.null.mean)
-    count = max(twins_of(name) for name in names)
-
-    def probe(model: SensorModel, base: BaseFit) -> Prediction:
-        return problem.predict(model, constrained_refit(model, base), count, only)
-
-    free = [(name, key) for name in names for key in candidate(name).fitted]
+def with_fitted_shapes(problem: Problem, fitted: Fit) -> Fit:
+    """The fit with all fitted parameters of its candidate at their best."""
+    name = fitted.name
+    problem.begin(f"fitting the shape of {name}")
+    only = problem.affected([name], fitted.prediction.mean - problem.null.mean)
+    probe = probe_of(problem, [name], only, twins_of(name))
+    free = [(name, key) for key in candidate(name).fitted]
     end = descend(problem, probe, fitted.model, fitted.base, free, COMPARED)
     shaped = where_ended(problem, fitted, end, free)
     return fitted if shaped.misfit > fitted.misfit else shaped

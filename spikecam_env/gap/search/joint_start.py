@@ -16,15 +16,15 @@ import numpy as np
 
 from spikecam_env.gap.candidates.strength import bounded, with_effect
 from spikecam_env.gap.candidates.table import LACKING, candidate
-from spikecam_env.gap.compare.prediction import Prediction, with_change_scaled
+from spikecam_env.gap.compare.prediction import with_change_scaled
 from spikecam_env.gap.compare.step import scale_to
 from spikecam_env.gap.fit.candidate import LARGEST_FACTOR, Fit
-from spikecam_env.gap.fit.gauss_newton import COMPARED, descend
+from spikecam_env.gap.fit.gauss_newton import COMPARED, descend, probe_of
 from spikecam_env.gap.fit.problem import Problem
 from spikecam_env.gap.fit.shapes import where_ended
 from spikecam_env.gap.search.round import Round
-from spikecam_env.gap.unit.refit import BaseFit, constrained_refit
-from spikecam_env.sensor import CATALOGUE, SensorModel
+from spikecam_env.gap.unit.refit import constrained_refit
+from spikecam_env.sensor import CATALOGUE
 
 DESCENTS = 2
 """Starts of two effects that start jointly, from which both are fitted."""
@@ -80,11 +80,8 @@ def _fit_pair(here: Problem, pair: Pair) -> Fit | None:
         own = {k: scaled[k] for k in fitted}
         return Fit(pair.first, own, {}, predicted, constrained_refit(model, here.case.base), rho, left, model)
 
-    def probe(model: SensorModel, base: BaseFit) -> Prediction:
-        return here.predict(model, constrained_refit(model, base), 1, only)
-
     def descended(fit: Fit) -> Fit:
-        end = descend(here, probe, fit.model, fit.base, free, COMPARED)
+        end = descend(here, probe_of(here, pair.names, only, 1), fit.model, fit.base, free, COMPARED)
         return where_ended(here, fit, end, free)
 
     with ThreadPoolExecutor(here.case.jobs) as pool:
