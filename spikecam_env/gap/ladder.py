@@ -206,11 +206,11 @@ def searched(judge: RungStatistics, model: SensorModel, names: Sequence[str]) ->
     for was, now in itertools.pairwise(
         forward_selection(Problem.of(case, model, null, values), names, templates_of(names, jobs=case.jobs))
     ):
-        if now.model is not was.model:
+        if now.start.model is not was.start.model:
             fit = was.fits[0]
-            effect = next(e for e in now.model.effects if e.name == fit.name)
+            effect = next(e for e in now.start.model.effects if e.name == fit.name)
             sd = next(iter(fit.sd.values()), np.nan)
-            rungs.append(judge.rung(now.model, now.prediction.mean, Missing(effect, sd)))
+            rungs.append(judge.rung(now.start.model, now.start.prediction.mean, Missing(effect, sd)))
     return rungs
 
 

@@ -10,6 +10,7 @@ import small
 
 from spikecam_env.gap.compare.distance import robust_squares
 from spikecam_env.gap.compare.prediction import Null, Prediction
+from spikecam_env.gap.fit.hypothesis import Hypothesis
 from spikecam_env.gap.search.round import Round
 from spikecam_env.gap.verdict.degree import Explanation, explanation_of
 from spikecam_env.sensor import CATALOGUE
@@ -29,7 +30,8 @@ def explained(
 
     def turn(**own: Any) -> Round:
         left = values - mean
-        return Round(model, small.unit(), given(mean), left, robust_squares(left), **own)
+        at = Hypothesis(model=model, base=small.unit(), prediction=given(mean), rho=left, misfit=robust_squares(left))
+        return Round(at, **own)
 
     for name, change, own in zip(("dead_time", "crosstalk"), changes, margins, strict=False):
         rounds.append(turn(fits=(SimpleNamespace(name=name),), margin=own))

@@ -13,10 +13,11 @@ from scipy import stats
 from spikecam_env.gap import Bars, Dark, Flat, Step
 from spikecam_env.gap.baseline.null_model import model_null
 from spikecam_env.gap.compare.distance import deviates
-from spikecam_env.gap.compare.prediction import Draw, Null, values_of
+from spikecam_env.gap.compare.prediction import Draw, Null, Prediction, values_of
 from spikecam_env.gap.fit.problem import Problem
 from spikecam_env.gap.observe.conditions import Condition, planned_conditions
 from spikecam_env.gap.observe.observation import ObservedRecording, observe
+from spikecam_env.gap.search.round import Round
 from spikecam_env.gap.statistics import StatisticKey
 from spikecam_env.gap.twins.case import Case, case_of
 from spikecam_env.gap.twins.simulate import expose
@@ -24,6 +25,7 @@ from spikecam_env.gap.unit.conversion import exact_refit, unit_from_refit
 from spikecam_env.gap.unit.refit import BaseFit
 from spikecam_env.sensor import CATALOGUE, Effect, SensorModel
 from spikecam_env.streams import pack_frames, unpack_frames
+from spikecam_env.types import Floats
 
 Spikes = NDArray[np.uint8]
 
@@ -137,3 +139,19 @@ def summary(z: dict[StatisticKey, float]) -> str:
 def quiet(count: int) -> float:
     """|z| that `count` normal deviates exceed once in a thousand times, with room for a null of TWINS twins."""
     return float(stats.norm.isf(0.5e-3 / max(count, 1))) + 1.0
+
+
+def found_alone(
+    case: Case, values: Floats, model: SensorModel, base: BaseFit, predicted: Prediction, margin: float
+) -> list[Round]:
+    """The rounds of a search that found a dead time, of 0.5 us to a fiftieth, with this prediction.
+
+    Args:
+        values: (S,) measured statistics.
+        model: with the dead time.
+        base: the unit beside it.
+    """
+    problem = Problem.of(case, MODEL, null(), values)
+    first = problem.hypothesis(MODEL, case.base, null().prediction)
+    fit = problem.fit_of("dead_time", {"tau_us": 0.5}, model, base, predicted, {"tau_us": 0.01})
+    return [Round(first, (fit,), margin=margin), Round(problem.hypothesis(model, base, predicted))]

@@ -19,11 +19,11 @@ from spikecam_env.gap.compare.distance import effect_size
 from spikecam_env.gap.compare.prediction import Prediction, with_change_scaled
 from spikecam_env.gap.compare.step import likeliest, scale_to, slope_of, step_of
 from spikecam_env.gap.fit.gauss_newton import COMPARED, LONGEST_STEP, MOST_STEPS, SMALL_STEP
+from spikecam_env.gap.fit.hypothesis import Fit
 from spikecam_env.gap.fit.problem import Problem
 from spikecam_env.gap.fit.recordings import OF_RANDOM_COURSE, twins_of
 from spikecam_env.gap.unit.indirect_inference import extrapolated_unit, has_converged
 from spikecam_env.gap.unit.refit import BaseFit, constrained_refit
-from spikecam_env.sensor import SensorModel
 from spikecam_env.types import Floats
 
 VISIBLE = 4.0
@@ -40,31 +40,6 @@ LARGEST_FACTOR = math.exp(LONGEST_STEP)
 
 LEAST_FACTOR = 1e-3
 """Least factor by which a strength is multiplied at once; and that of a strength whose fit does not go on."""
-
-
-@dataclass(frozen=True, eq=False)
-class Fit:
-    """A candidate at its best fit."""
-
-    name: str
-    parameters: dict[str, float]
-    sd: dict[str, float]
-    """Standard deviations, by parameter."""
-    prediction: Prediction
-    """The prediction of `model`."""
-    base: BaseFit
-    """The unit under `model`."""
-    rho: Floats
-    """(S,) residuals, in noise."""
-    misfit: float
-    """See `distance.residual_and_misfit`."""
-    model: SensorModel
-    """The model of the problem with the effect."""
-
-    def added_to(self, model: SensorModel) -> list[str]:
-        """Names of the effects that it adds to a model: its own, then those that are fitted with it."""
-        has = {self.name, *(e.name for e in model.effects)}
-        return [self.name, *(e.name for e in self.model.effects if e.name not in has)]
 
 
 def fit(
@@ -205,10 +180,9 @@ def _rescaled_fit(problem: Problem, name: str, trial: _Trial, bare: BaseFit, way
         predicted = replace(way.predicted, mean=mean)
     else:
         predicted = with_change_scaled(problem.null, way.predicted, times)
-    rho, misfit = problem.residual_and_misfit(predicted)
     sd = {effect.strength: abs(final[effect.strength]) * (way.sd / max(abs(way.scale), 1e-9) / effect.power)}
-    model = with_effect(problem.model, name, final)
-    return Fit(name, final, sd, predicted, extrapolated_unit(bare, trial.base, times, most), rho, misfit, model)
+    base = extrapolated_unit(bare, trial.base, times, most)
+    return problem.fit_of(name, final, with_effect(problem.model, name, final), base, predicted, sd)
 
 
 def until_visible(name: str, parameters: dict[str, float], size: float) -> dict[str, float]:
@@ -270,9 +244,8 @@ def _fit_random_course(problem: Problem, name: str, parameters: dict[str, float]
         if 1 / LARGEST_FACTOR < factor < LARGEST_FACTOR:
             break
     predicted = with_change_scaled(problem.null, predicted, factor)
-    rho, left = problem.residual_and_misfit(predicted)
     sds = {strength: parameters[strength] * max(sd, np.sqrt(2.0 / len(only))) / power}
-    return Fit(name, parameters, sds, predicted, base, rho, left, with_effect(problem.model, name, parameters))
+    return problem.fit_of(name, parameters, with_effect(problem.model, name, parameters), base, predicted, sds)
 
 
 def _fit_pattern(problem: Problem, name: str, start: Mapping[str, float]) -> Fit:
@@ -286,8 +259,7 @@ def _fit_pattern(problem: Problem, name: str, start: Mapping[str, float]) -> Fit
                 tried = bounded(name, {**centre, key: centre[key] * factor})
                 model = with_effect(problem.model, name, tried)
                 predicted = problem.with_pattern(model, problem.null.prediction)
-                rho, left = problem.residual_and_misfit(predicted)
-                now = Fit(name, tried, {}, predicted, constrained_refit(model, problem.case.base), rho, left, model)
+                now = problem.fit_of(name, tried, model, constrained_refit(model, problem.case.base), predicted)
                 best = now if best is None or now.misfit < best.misfit else best
     assert best is not None
     return best

@@ -9,10 +9,10 @@ import numpy as np
 
 from spikecam_env.gap.candidates.table import Candidates, candidate
 from spikecam_env.gap.compare.distance import APART
-from spikecam_env.gap.fit.candidate import Fit
 from spikecam_env.gap.fit.confirm import confirmed
 from spikecam_env.gap.fit.coordinates import is_apart
 from spikecam_env.gap.fit.gauss_newton import WHITE, Probe, descend, probe_of
+from spikecam_env.gap.fit.hypothesis import Fit
 from spikecam_env.gap.fit.last_step import Errors, Slopes, last_step
 from spikecam_env.gap.fit.problem import Problem
 from spikecam_env.gap.fit.recordings import twins_of, with_held_out
@@ -79,7 +79,7 @@ def with_last_step(problem: Problem, fitted: Fit, names: Sequence[str], slopes: 
     """
     best, errors, own2 = last_step(problem, fitted, names, slopes)
     errors[fitted.name] = no_smaller(errors[fitted.name], fitted.sd)
-    own = next(e for e in best.model.effects if e.name == fitted.name).parameters()
+    own = best.parameters_of(fitted.name)
     return replace(best, parameters={k: own[k] for k in fitted.parameters}, sd=errors[fitted.name]), errors, own2
 
 

@@ -17,7 +17,6 @@ import numpy as np
 
 from spikecam_env.gap.candidates.table import candidate
 from spikecam_env.gap.compare.step import step_of
-from spikecam_env.gap.fit.candidate import Fit
 from spikecam_env.gap.fit.coordinates import error_of
 from spikecam_env.gap.fit.gauss_newton import (
     WHITE,
@@ -29,6 +28,7 @@ from spikecam_env.gap.fit.gauss_newton import (
     moved,
     prior_sd,
 )
+from spikecam_env.gap.fit.hypothesis import Fit
 from spikecam_env.gap.fit.problem import Problem
 from spikecam_env.types import Floats
 

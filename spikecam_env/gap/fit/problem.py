@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from spikecam_env.gap.compare.distance import freedom_of, is_significant, residual, residual_and_misfit
 from spikecam_env.gap.compare.prediction import Null, Prediction, law_error, own_variance
+from spikecam_env.gap.fit.hypothesis import Fit, Hypothesis
 from spikecam_env.gap.fit.predict import predict_by_twins, settled_unit, with_drawn_pattern
 from spikecam_env.gap.fit.recordings import recordings_affected
 from spikecam_env.gap.settings import DiagnosisSettings
@@ -47,14 +48,28 @@ class Problem:
         """The same, to be fitted to all recordings."""
         return replace(self, seen=self.values)
 
-    def standing_on(self, model: SensorModel, base: BaseFit, predicted: Prediction) -> Problem:
-        """The problem that is left beside effects that were added.
+    def standing_on(self, at: Hypothesis) -> Problem:
+        """The problem that is left beside the effects of a hypothesis."""
+        case = replace(self.case, base=at.base)
+        return replace(self, case=case, model=at.model, null=standing_on(self.null, at.prediction))
 
-        Args:
-            model: the model with those effects.
-            predicted: its prediction.
-        """
-        return replace(self, case=replace(self.case, base=base), model=model, null=standing_on(self.null, predicted))
+    def hypothesis(self, model: SensorModel, base: BaseFit, predicted: Prediction) -> Hypothesis:
+        """A model, its unit and its prediction, judged on the recordings to fit."""
+        rho, misfit = self.residual_and_misfit(predicted)
+        return Hypothesis(model=model, base=base, prediction=predicted, rho=rho, misfit=misfit)
+
+    def fit_of(
+        self,
+        name: str,
+        parameters: Mapping[str, float],
+        model: SensorModel,
+        base: BaseFit,
+        predicted: Prediction,
+        sd: Mapping[str, float] | None = None,
+    ) -> Fit:
+        """A hypothesis by the candidate that it was made for, with that one's parameters and their errors."""
+        at = self.hypothesis(model, base, predicted)
+        return Fit(**vars(at), name=name, parameters=dict(parameters), sd=dict(sd or {}))
 
     def residual_and_misfit(self, predicted: Prediction) -> tuple[Floats, float]:
         """((S,) residual, misfit) of a prediction on the recordings to fit."""

@@ -6,15 +6,14 @@ They cost twins, one a parameter, and are fitted only where they can matter.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
 
 import numpy as np
 
 from spikecam_env.gap.candidates.table import candidate
 from spikecam_env.gap.compare.distance import is_significant
-from spikecam_env.gap.fit.candidate import Fit
 from spikecam_env.gap.fit.coordinates import error_of
 from spikecam_env.gap.fit.gauss_newton import COMPARED, Descent, Free, descend, probe_of
+from spikecam_env.gap.fit.hypothesis import Fit
 from spikecam_env.gap.fit.problem import Problem
 from spikecam_env.gap.fit.recordings import twins_of
 
@@ -52,16 +51,8 @@ def with_fitted_shapes(problem: Problem, fitted: Fit) -> Fit:
 
 def where_ended(problem: Problem, fitted: Fit, end: Descent, free: Free) -> Fit:
     """The fit at the end of a descent over the parameters `free`, with errors of its own effect's."""
-    rho, left = problem.residual_and_misfit(end.prediction)
     values = next(e for e in end.model.effects if e.name == fitted.name).parameters()
     errors = zip(free, np.sqrt(np.diag(end.covariance)), strict=True)
-    return replace(
-        fitted,
-        parameters={k: values[k] for k in fitted.parameters},
-        sd={k: error_of(name, k, values[k], float(e)) for (name, k), e in errors if name == fitted.name},
-        prediction=end.prediction,
-        base=end.base,
-        rho=rho,
-        misfit=left,
-        model=end.model,
-    )
+    sd = {k: error_of(name, k, values[k], float(e)) for (name, k), e in errors if name == fitted.name}
+    own = {k: values[k] for k in fitted.parameters}
+    return problem.fit_of(fitted.name, own, end.model, end.base, end.prediction, sd)

@@ -19,8 +19,8 @@ from spikecam_env.sensor import SensorModel
 def evidence_for(comparison: Comparison, rounds: Sequence[Round], conclusion: Conclusion) -> Evidence:
     """Twins of the tested model, with its nominal unit, and where it differs of the patched one."""
     case, tested = comparison.case, comparison.tested
-    model = rounds[-1].model if rounds else comparison.model
-    unit = rounds[-1].base if rounds else constrained_refit(model, case.base)
+    model = rounds[-1].start.model if rounds else comparison.model
+    unit = rounds[-1].start.base if rounds else constrained_refit(model, case.base)
     changed = model is not tested or conclusion.parameters
     base = constrained_refit(tested, comparison.off.nominal)
     return evidence_of(case, tested, base, *((model, unit) if changed else ()))

@@ -15,8 +15,9 @@ import numpy as np
 from spikecam_env.gap.candidates.strength import MOST_EXTRAPOLATED, bounded, with_effect
 from spikecam_env.gap.compare.prediction import with_change_scaled
 from spikecam_env.gap.compare.step import scale_to
-from spikecam_env.gap.fit.candidate import ROUND_OFF, Fit
+from spikecam_env.gap.fit.candidate import ROUND_OFF
 from spikecam_env.gap.fit.gauss_newton import MOST_STEPS
+from spikecam_env.gap.fit.hypothesis import Fit
 from spikecam_env.gap.fit.problem import Problem
 from spikecam_env.gap.unit.indirect_inference import extrapolated_unit
 from spikecam_env.gap.unit.refit import constrained_refit
@@ -58,10 +59,9 @@ def fit_pair(problem: Problem, names: Collection[str]) -> Fit | None:
         if ROUND_OFF[0] < factor < ROUND_OFF[1]:
             break
     predicted = with_change_scaled(problem.null, predicted, factor**2)
-    rho, left = problem.residual_and_misfit(predicted)
     model = with_both(problem.model, tau_us, frame_rate_hz)
-    beta = next(e for e in model.effects if e.name == PAIR[1]).parameters()
-    return Fit(PAIR[1], {"beta": beta["beta"]}, {}, predicted, base, rho, left, model)
+    beta = next(e for e in model.effects if e.name == PAIR[1]).parameters()["beta"]
+    return problem.fit_of(PAIR[1], {"beta": beta}, model, base, predicted)
 
 
 def with_both(model: SensorModel, tau_us: float, frame_rate_hz: float) -> SensorModel:

@@ -9,7 +9,7 @@ import numpy as np
 from spikecam_env.gap.candidates.table import candidate
 from spikecam_env.gap.compare.distance import is_significant, residual
 from spikecam_env.gap.compare.prediction import Draw
-from spikecam_env.gap.fit.candidate import Fit
+from spikecam_env.gap.fit.hypothesis import Fit
 from spikecam_env.gap.fit.problem import Problem
 from spikecam_env.gap.search.rivals import is_rival, lead
 from spikecam_env.sensor import SensorModel

@@ -16,10 +16,10 @@ from functools import partial
 import numpy as np
 
 from spikecam_env.gap.baseline.alarm import is_discrepant, with_held_out_motion
-from spikecam_env.gap.compare.distance import in_noise, is_significant, loss, residual
-from spikecam_env.gap.fit.candidate import Fit
+from spikecam_env.gap.compare.distance import in_noise, is_significant, loss
 from spikecam_env.gap.fit.confirm import confirmed, with_dark_levels_open, with_prediction
 from spikecam_env.gap.fit.gauss_newton import PROBES
+from spikecam_env.gap.fit.hypothesis import Fit
 from spikecam_env.gap.fit.joint import is_noisy, no_smaller, refined_together, simulated_for, stepped_once
 from spikecam_env.gap.fit.last_step import Errors
 from spikecam_env.gap.fit.problem import Problem
@@ -68,24 +68,22 @@ def forward_selection(problem: Problem, names: Sequence[str], templates: Templat
         The rounds that added an effect, and a last one with the final model.
     """
     rounds: list[Round] = []
-    given, null, values, settings = problem, problem.null, problem.values, problem.settings
-    now, base, prediction = problem.model, constrained_refit(problem.model, problem.case.base), null.prediction
+    given, null, settings = problem, problem.null, problem.settings
+    now = problem.hypothesis(problem.model, constrained_refit(problem.model, problem.case.base), null.prediction)
     while len(rounds) < settings.searching.most_effects:
-        rho = residual(null, problem.seen, prediction)
-        by_fit = is_significant(null, rho, prediction) if rounds else is_discrepant(null, problem.seen)
-        if rounds and not (by_fit or is_significant(null, residual(null, values, prediction), prediction)):
+        by_fit = not problem.is_explained(now.prediction) if rounds else is_discrepant(null, problem.seen)
+        if rounds and not by_fit and problem.fitted_to_all.is_explained(now.prediction):
             break
         cost = settings.searching.campaigns_per_effect * len(problem.case.conditions)
         if rounds and not problem.allows(ANOTHER[len(rounds)], cost, needed=len(rounds) == 1):
             break
         if not by_fit:
-            problem = Problem.of(with_held_out_motion(problem.case), problem.model, null, values)
-            rho = residual(null, problem.seen, prediction)
+            problem = Problem.of(with_held_out_motion(problem.case), problem.model, null, problem.values)
         chance = float(np.sum(null.weight * np.isfinite(problem.seen)))
-        here = problem.standing_on(now, base, prediction)
+        here = problem.standing_on(now)
         motion_alone = problem.case is not given.case
         to_join = JOIN if rounds else settings.deviance.accept
-        turn = Round(now, base, prediction, rho, here.misfit(), motion_alone=motion_alone, to_join=to_join)
+        turn = Round(replace(now, misfit=here.misfit()), motion_alone=motion_alone, to_join=to_join)
         turn = with_candidates(problem, here, names, templates, turn)
         rounds.append(turn)
         if not turn.fits or not has_candidate(turn, here.null):
@@ -93,17 +91,18 @@ def forward_selection(problem: Problem, names: Sequence[str], templates: Templat
         rounds[-1:] = one_by_one(turn)
         together = joined(problem, rounds, chance)
         best = together[-1].fits[0]
-        weak = turn.misfit - turn.fits[0].misfit < settings.deviance.accept
-        if not is_improvement(null, problem.misfit(prediction), best, len(rounds) > 1, weak):
+        weak = turn.start.misfit - turn.fits[0].misfit < settings.deviance.accept
+        if not is_improvement(null, problem.misfit(now.prediction), best, len(rounds) > 1, weak):
             break
         if best.name in absent(problem.case, given.model, best.model):
             break
         rounds = together
-        now, base, prediction = best.model, best.base, best.prediction
-        if prediction.own is not None or (is_noisy(problem, base) and not problem.case.scenes_only):
-            prediction = with_dark_levels_open(problem, now, base, prediction)
-    rho, left_over = problem.residual_and_misfit(prediction)
-    return try_cancelling_pair(problem, names, [*rounds, Round(now, base, prediction, rho, left_over)])
+        prediction = best.prediction
+        if prediction.own is not None or (is_noisy(problem, best.base) and not problem.case.scenes_only):
+            prediction = with_dark_levels_open(problem, best.model, best.base, prediction)
+        now = problem.hypothesis(best.model, best.base, prediction)
+    now = problem.hypothesis(now.model, now.base, now.prediction)
+    return try_cancelling_pair(problem, names, [*rounds, Round(now)])
 
 
 def with_candidates(problem: Problem, here: Problem, names: Sequence[str], templates: Templates, turn: Round) -> Round:
@@ -114,24 +113,24 @@ def with_candidates(problem: Problem, here: Problem, names: Sequence[str], templ
         here: the problem with the effects of earlier rounds.
     """
     null, seen = here.null, here.seen
-    left = [n for n in names if n not in {e.name for e in turn.model.effects}]
+    left = [n for n in names if n not in turn.start.effects]
     screened = screened_beside(here, left, templates)
     distance = in_noise(null, seen)
     searching, deviance = here.settings.searching, here.settings.deviance
     starts = starts_to_fit(screened, loss(null, distance), searching, groups_that_stand_out(null, distance))
     confirm = partial(confirmed, here)
-    fits, tries = fits_of(here, turn.misfit, starts)
+    fits, tries = fits_of(here, turn.start.misfit, starts)
     places = searching.most_effects - (len(here.model.effects) - len(problem.model.effects))
     if places > 1:
         fits = with_pairs(fits, fit_pairs(here, left), deviance.tie)
     visible = [f for f in fits if is_visible(null, f)]
-    done, rest = confirmed_in_order(visible, confirm, deviance.keep, enough=turn.misfit - turn.to_join)
+    done, rest = confirmed_in_order(visible, confirm, deviance.keep, enough=turn.start.misfit - turn.to_join)
     rest = [*rest, *(f for f in fits if not is_visible(null, f))]
-    if done and done[0].name in {s.name for s in tries} and turn.misfit - done[0].misfit > turn.to_join:
-        anew = [confirm(f) for f in try_other_starts(here, done[0], turn.misfit, screened, tries)]
+    if done and done[0].name in {s.name for s in tries} and turn.start.misfit - done[0].misfit > turn.to_join:
+        anew = [confirm(f) for f in try_other_starts(here, done[0], turn.start.misfit, screened, tries)]
         done[0] = min((done[0], *anew), key=lambda f: f.misfit)
     done, rivals = chosen_of(here, problem.null.draws, done)
-    margin = margin_of(here.model, turn.misfit, [*done, *rest])
+    margin = margin_of(here.model, turn.start.misfit, [*done, *rest])
     return replace(turn, fits=(*done, *rest), rivals=rivals, margin=margin)
 
 
@@ -152,14 +151,14 @@ def joined(problem: Problem, rounds: Sequence[Round], chance: float) -> list[Rou
     *before, last = rounds
     best = last.fits[0]
     if before and may_try_without_earlier(problem, len(rounds)):
-        earlier = {r.fits[0].name: r.fits[0].prediction.mean - r.prediction.mean for r in before}
+        earlier = {r.fits[0].name: r.fits[0].prediction.mean - r.start.prediction.mean for r in before}
         best = try_without_earlier(problem, best, earlier)
         for i, turn in enumerate(before):
-            if turn.fits[0].name in {e.name for e in best.model.effects}:
+            if turn.fits[0].name in best.effects:
                 best, before[i] = try_in_place_of_earlier(problem, best, turn)
     elif before:
         best = with_prediction(problem, best, best.prediction)
-    names = [n for n in (*(r.fits[0].name for r in before), best.name) if n in {e.name for e in best.model.effects}]
+    names = [n for n in (*(r.fits[0].name for r in before), best.name) if n in best.effects]
     if is_stand_in(problem, last, best, chance, bool(before)):
         return [*before, replace(last, fits=(best, *last.fits[1:]))]
     if not may_be_refined(problem, best, names):

@@ -18,8 +18,9 @@ from spikecam_env.gap.candidates.strength import bounded, with_effect
 from spikecam_env.gap.candidates.table import LACKING, candidate
 from spikecam_env.gap.compare.prediction import with_change_scaled
 from spikecam_env.gap.compare.step import scale_to
-from spikecam_env.gap.fit.candidate import LARGEST_FACTOR, Fit
+from spikecam_env.gap.fit.candidate import LARGEST_FACTOR
 from spikecam_env.gap.fit.gauss_newton import COMPARED, descend, probe_of
+from spikecam_env.gap.fit.hypothesis import Fit
 from spikecam_env.gap.fit.problem import Problem
 from spikecam_env.gap.fit.shapes import where_ended
 from spikecam_env.gap.search.round import Round
@@ -76,9 +77,8 @@ def _fit_pair(here: Problem, pair: Pair) -> Fit | None:
         scale = float(np.sign(scale) * np.clip(abs(scale), 1 / LARGEST_FACTOR, LARGEST_FACTOR))
         scaled = bounded(pair.first, {**first, strength: first[strength] * scale})
         predicted, model = with_change_scaled(here.null, predicted, scale), with_effect(model, pair.first, scaled)
-        rho, left = here.residual_and_misfit(predicted)
         own = {k: scaled[k] for k in fitted}
-        return Fit(pair.first, own, {}, predicted, constrained_refit(model, here.case.base), rho, left, model)
+        return here.fit_of(pair.first, own, model, constrained_refit(model, here.case.base), predicted)
 
     def descended(fit: Fit) -> Fit:
         end = descend(here, probe_of(here, pair.names, only, 1), fit.model, fit.base, free, COMPARED)
@@ -101,9 +101,9 @@ def one_by_one(turn: Round) -> list[Round]:
     """The round; where another effect is fitted with its best, as two, the second of that one."""
     best = turn.fits[0]
     rounds = [turn]
-    for name in best.added_to(turn.model)[1:]:
-        effect = next(e for e in best.model.effects if e.name == name)
-        parameters = {k: effect.parameters()[k] for k in candidate(name).fitted}
+    for name in best.added_to(turn.start.model)[1:]:
+        parameters = {k: best.parameters_of(name)[k] for k in candidate(name).fitted}
         own = replace(best, name=name, parameters=parameters, sd={})
-        rounds.append(replace(turn, model=best.model.without(name), fits=(own,), rivals=()))
+        start = replace(turn.start, model=best.model.without(name))
+        rounds.append(replace(turn, start=start, fits=(own,), rivals=()))
     return rounds

@@ -21,8 +21,9 @@ import numpy as np
 
 from spikecam_env.gap.candidates.table import candidate
 from spikecam_env.gap.compare.distance import is_significant, residual
-from spikecam_env.gap.fit.candidate import Fit, fit
+from spikecam_env.gap.fit.candidate import fit
 from spikecam_env.gap.fit.confirm import confirmed, no_more_certain, resettled, with_prediction
+from spikecam_env.gap.fit.hypothesis import Fit
 from spikecam_env.gap.fit.joint import refined_together
 from spikecam_env.gap.fit.last_step import Errors
 from spikecam_env.gap.fit.problem import Problem
@@ -100,15 +101,14 @@ def try_in_place_of_earlier(problem: Problem, best: Fit, turn: Round) -> tuple[F
         (the fit of all effects, the earlier round), with the effect that is better now.
     """
     first, searching = turn.fits[0], problem.settings.searching
-    least = turn.misfit - WORTH * (turn.misfit - first.misfit)
-    has = {e.name for e in best.model.effects}
-    others = sorted((f for f in turn.fits if f.name not in has and f.misfit < least), key=lambda f: f.misfit)
+    least = turn.start.misfit - WORTH * (turn.start.misfit - first.misfit)
+    others = sorted((f for f in turn.fits if f.name not in best.effects and f.misfit < least), key=lambda f: f.misfit)
     others = others[: searching.earlier_tried]
     if not others or not problem.allows(f"alternatives to {first.name}"):
         return best, turn
     rest = best.model.without(first.name)
     alone = confirmed(problem, resettled(problem, best, rest))
-    here = problem.standing_on(rest, alone.base, alone.prediction)
+    here = problem.standing_on(alone)
     with ThreadPoolExecutor(problem.case.jobs) as pool:
         fits = list(pool.map(lambda f: fit(here, f.name, f.parameters), others))
     confirm = partial(confirmed, here)
@@ -155,9 +155,9 @@ def runner_up(turn: Round, names: Sequence[str], same_share: float) -> list[Fit]
         same_share: share of the best's misfit that it has to have removed.
     """
     best, *others = turn.fits
-    least = turn.misfit - same_share * (turn.misfit - best.misfit)
+    least = turn.start.misfit - same_share * (turn.start.misfit - best.misfit)
     near = [f for f in others if len(f.prediction.draws) > 1 and f.misfit < least and f.name not in names]
-    beside = [f for f in near if {e.name for e in f.model.effects} - {f.name} >= set(names[:-1])]
+    beside = [f for f in near if f.effects - {f.name} >= set(names[:-1])]
     return sorted(beside, key=lambda f: f.misfit)[:1]
 
 
@@ -184,7 +184,7 @@ def try_without_earlier(problem: Problem, fitted: Fit, earlier: Mapping[str, Flo
     both = confirmed(problem, resettled(problem, fitted, fitted.model))
     both = no_more_certain(problem, both, fitted.prediction)
     for name, change in earlier.items():
-        if name not in {e.name for e in both.model.effects} or is_missed(problem, both, change):
+        if name not in both.effects or is_missed(problem, both, change):
             continue
         fewer = confirmed(problem, resettled(problem, both, both.model.without(name)))
         if fewer.misfit < both.misfit + problem.settings.deviance.keep:
@@ -210,11 +210,10 @@ def try_cancelling_pair(problem: Problem, names: Sequence[str], rounds: list[Rou
     Returns:
         Rounds that find the two, if they leave less misfit than the search by `Deviance.accept`; else `rounds`.
     """
-    first, last = rounds[0], rounds[-1]
-    null = problem.null
+    first, last = rounds[0], rounds[-1].start
     if not first.fits or not candidate(first.fits[0].name).bends_response:
         return rounds
-    if not is_significant(null, residual(null, problem.values, last.prediction), last.prediction):
+    if problem.fitted_to_all.is_explained(last.prediction):
         return rounds
     if not problem.allows("two nonlinearities that cancel", needed=True):
         return rounds
@@ -224,13 +223,13 @@ def try_cancelling_pair(problem: Problem, names: Sequence[str], rounds: list[Rou
     fitted, errors, used_held_out = refined_together(problem, fitted, PAIR)
     if fitted.misfit > last.misfit - problem.settings.deviance.accept:
         return rounds
-    one, other = (next(e for e in fitted.model.effects if e.name == name).parameters() for name in PAIR)
+    one, other = (fitted.parameters_of(name) for name in PAIR)
     alone = replace(fitted, name=PAIR[0], parameters={"tau_us": one["tau_us"]}, sd=errors[PAIR[0]])
     fitted = replace(fitted, parameters={"beta": other["beta"]}, sd=errors[PAIR[1]])
-    first = replace(first, margin=(last.misfit - fitted.misfit) / (first.misfit - fitted.misfit))
+    first = replace(first, margin=(last.misfit - fitted.misfit) / (first.start.misfit - fitted.misfit))
     between = replace(
         first,
-        model=fitted.model.without(PAIR[1]),
+        start=replace(first.start, model=fitted.model.without(PAIR[1])),
         fits=(fitted,),
         rivals=(),
         used_held_out=used_held_out,
@@ -240,7 +239,7 @@ def try_cancelling_pair(problem: Problem, names: Sequence[str], rounds: list[Rou
     return [
         replace(first, fits=(alone, *rest), rivals=()),
         between,
-        Round(fitted.model, fitted.base, fitted.prediction, fitted.rho, fitted.misfit),
+        Round(fitted),
     ]
 
 

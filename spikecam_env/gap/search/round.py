@@ -10,14 +10,12 @@ import numpy as np
 
 from spikecam_env.gap.candidates.table import candidate, expected_events
 from spikecam_env.gap.compare.distance import is_significant
-from spikecam_env.gap.compare.prediction import Null, Prediction
-from spikecam_env.gap.fit.candidate import Fit
+from spikecam_env.gap.compare.prediction import Null
+from spikecam_env.gap.fit.hypothesis import Fit, Hypothesis
 from spikecam_env.gap.fit.shapes import WORTH
 from spikecam_env.gap.settings import Deviance
 from spikecam_env.gap.twins.case import Case
-from spikecam_env.gap.unit.refit import BaseFit
 from spikecam_env.sensor import SensorModel
-from spikecam_env.types import Floats
 
 SAME_SHARE = 0.8
 """Of what the best removes, nearly all: a runner-up, or another start, that removes more is tried in its place.  A
@@ -32,18 +30,10 @@ LEAST_CHANGE = 2.0
 
 @dataclass(frozen=True)
 class Round:
-    """One turn of the search."""
+    """One turn of the search: a hypothesis, and the candidates that were added to it."""
 
-    model: SensorModel
-    """The model it started from."""
-    base: BaseFit
-    """The unit under `model`."""
-    prediction: Prediction
-    """The prediction of `model`."""
-    rho: Floats
-    """(S,) residuals of `model`, in noise."""
-    misfit: float
-    """Misfit of `model`."""
+    start: Hypothesis
+    """The hypothesis that it began with."""
     fits: tuple[Fit, ...] = ()
     """The candidates that were fitted, the chosen one first."""
     rivals: tuple[str, ...] = ()
@@ -60,16 +50,16 @@ class Round:
 
 def adding(rounds: Sequence[Round]) -> list[tuple[Round, Round]]:
     """Rounds whose best is an effect of the last model, each with the round after it."""
-    last = {e.name for e in rounds[-1].model.effects} if rounds else set()
+    last = rounds[-1].start.effects if rounds else set()
     pairs = itertools.pairwise(rounds)
-    return [(r, after) for r, after in pairs if after.model is not r.model and r.fits[0].name in last]
+    return [(r, after) for r, after in pairs if after.start.model is not r.start.model and r.fits[0].name in last]
 
 
 def has_candidate(turn: Round, here: Null) -> bool:
     """Whether a round's best is to be fitted together with the earlier effects; here: the null model with those."""
     best = turn.fits[0]
     least = here.settings.deviance.accept if is_second_bend(turn, best) else turn.to_join
-    return turn.misfit - best.misfit >= least and is_visible(here, best)
+    return turn.start.misfit - best.misfit >= least and is_visible(here, best)
 
 
 def is_second_bend(turn: Round, fitted: Fit) -> bool:
@@ -77,7 +67,7 @@ def is_second_bend(turn: Round, fitted: Fit) -> bool:
 
     A bend fits the error of another, so it has to remove as much misfit as a first effect.
     """
-    return candidate(fitted.name).bends_response and any(candidate(e.name).bends_response for e in turn.model.effects)
+    return any(candidate(name).bends_response for name in turn.start.effects) and candidate(fitted.name).bends_response
 
 
 def is_visible(here: Null, fitted: Fit) -> bool:
@@ -130,4 +120,4 @@ def is_small_share(turn: Round, left: float, chance: float, later: bool) -> bool
         later: whether there are earlier effects.
     """
     least = WORTH if later else 1 - SAME_SHARE
-    return turn.misfit - left < least * (turn.misfit - chance)
+    return turn.start.misfit - left < least * (turn.start.misfit - chance)

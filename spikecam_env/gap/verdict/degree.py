@@ -75,7 +75,7 @@ def explanation_of(null: Null, values: Floats, rounds: Sequence[Round]) -> Expla
         values: (S,) measured statistics.
         rounds: of a search, the last with the final model.
     """
-    last, steps, limits = rounds[-1].prediction, adding(rounds), null.settings.concluding
+    last, steps, limits = rounds[-1].start.prediction, adding(rounds), null.settings.concluding
     off = is_left(null, values, last)
     every = tuple(r.fits[0].name for r, _ in steps)
     if not off.any():
@@ -95,14 +95,15 @@ def right_names(rounds: Sequence[Round], limits: Concluding) -> tuple[str, ...]:
     """Effects with a margin; beside effects without one, those that also remove a share of the misfit."""
     steps = adding(rounds)
     having = [(r, after) for r, after in steps if r.margin >= limits.least_margin]
-    least = LEAST_SHARE * (rounds[0].misfit - rounds[-1].misfit) if len(having) < len(steps) else -np.inf
-    return tuple(r.fits[0].name for r, after in having if r.misfit - after.misfit >= least)
+    least = LEAST_SHARE * (rounds[0].start.misfit - rounds[-1].start.misfit) if len(having) < len(steps) else -np.inf
+    return tuple(r.fits[0].name for r, after in having if r.start.misfit - after.start.misfit >= least)
 
 
 def squares_changed(null: Null, rounds: Sequence[Round]) -> Floats:
     """(S,) sum over effects of the square of each one's change, in the null model's noise."""
     steps = adding(rounds)
-    changes = [np.nan_to_num((after.prediction.mean - r.prediction.mean) / null.noise) for r, after in steps]
+    means = [(r.start.prediction.mean, after.start.prediction.mean) for r, after in steps]
+    changes = [np.nan_to_num((after - before) / null.noise) for before, after in means]
     return np.asarray(np.sum(np.square(changes), axis=0) if changes else np.zeros(len(null.keys)))
 
 

@@ -10,8 +10,8 @@ import numpy as np
 
 from spikecam_env.gap.baseline.missing_from_refit import Missing
 from spikecam_env.gap.candidates.table import candidate
-from spikecam_env.gap.fit.candidate import Fit
 from spikecam_env.gap.fit.coordinates import interval_of
+from spikecam_env.gap.fit.hypothesis import Fit
 from spikecam_env.gap.result import MOST_CONFIDENCE, Estimate, NamedEffect
 from spikecam_env.gap.search.round import Round, absent, adding
 from spikecam_env.gap.verdict.comparison import Comparison
@@ -23,7 +23,7 @@ def patched_model(comparison: Comparison, rounds: Sequence[Round]) -> SensorMode
     """The last model of a search, without effects that do nothing beside the others."""
     if not rounds:
         return comparison.model
-    last = rounds[-1].model
+    last = rounds[-1].start.model
     return reduce(SensorModel.without, absent(comparison.case, comparison.model, last), last)
 
 

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from spikecam_env.gap.candidates.table import candidate
-from spikecam_env.gap.fit.candidate import Fit
+from spikecam_env.gap.fit.hypothesis import Fit
 from spikecam_env.gap.result import Ranked, why_rejected
 from spikecam_env.gap.search.round import Round
 from spikecam_env.gap.verdict.named_effects import estimates
@@ -34,18 +34,18 @@ def ranked(fit: Fit, turn: Round, accept: float, *, accepted: bool) -> Ranked:
     worst = float(np.abs(fit.rho).max())
     reason = f"leaves {worst:.1f} noises at worst" if accepted else reason_against(fit, turn, accept)
     own = estimates(fit.name, fit.parameters, fit.sd)
-    return Ranked(fit.name, candidate(fit.name).family, turn.misfit, fit.misfit, own, accepted, reason)
+    return Ranked(fit.name, candidate(fit.name).family, turn.start.misfit, fit.misfit, own, accepted, reason)
 
 
 def reason_against(fit: Fit, turn: Round, accept: float) -> str:
     """Why a fit of a round was not added, or not kept."""
     chosen = turn.fits[0]
-    if turn.misfit - fit.misfit >= accept:
+    if turn.start.misfit - fit.misfit >= accept:
         if fit is chosen:
             return "not kept: it explains nothing more beside the others, or on held-out recordings"
         if fit.misfit < chosen.misfit:
             return _reason_against_better(fit, chosen)
-    return why_rejected(fit.misfit, turn.misfit, chosen.name, accept)
+    return why_rejected(fit.misfit, turn.start.misfit, chosen.name, accept)
 
 
 def _reason_against_better(fit: Fit, chosen: Fit) -> str:

@@ -14,8 +14,8 @@ from spikecam_env.gap.baseline.off_nominal import OffNominal, off_nominal, with_
 from spikecam_env.gap.candidates.table import candidate
 from spikecam_env.gap.compare.distance import adjusted, deviates, residual
 from spikecam_env.gap.compare.prediction import Null
-from spikecam_env.gap.fit.candidate import Fit
 from spikecam_env.gap.fit.confirm import confirmed
+from spikecam_env.gap.fit.hypothesis import Fit, Hypothesis
 from spikecam_env.gap.fit.problem import Problem
 from spikecam_env.gap.fit.shapes import WORTH
 from spikecam_env.gap.result import (
@@ -56,7 +56,7 @@ def conclude(comparison: Comparison, rounds: Sequence[Round], floor: float) -> C
         floor: floor of the gap, by two halves of the measurement.
     """
     case, null = comparison.case, comparison.null
-    last = rounds[-1].prediction if rounds else null.prediction
+    last = rounds[-1].start.prediction if rounds else null.prediction
     left = residual(null, comparison.values, last)
     found = kept(comparison, rounds)
     by_chance = not rounds or may_be_chance(comparison, found)
@@ -123,7 +123,7 @@ def parameters_off(comparison: Comparison, rounds: Sequence[Round]) -> dict[str,
     """
     if not rounds or comparison.missing:
         return comparison.off.parameters
-    case, tested, last = comparison.case, comparison.tested, rounds[-1]
+    case, tested, last = comparison.case, comparison.tested, rounds[-1].start
     off = off_beside(case, tested, last, last.base).parameters
     refits = [d.refit for d in last.prediction.draws if d.refit is not None]
     as_read = [off_beside(case, tested, last, refit).parameters for refit in refits[-1:]] if off else []
@@ -144,7 +144,7 @@ def is_scattered(name: str, unit: Mapping[str, float], as_read: Mapping[str, Map
     return abs(math.log(read / unit["ratio"])) >= abs(math.log(unit["ratio"]))
 
 
-def off_beside(case: Case, tested: SensorModel, last: Round, unit: BaseFit) -> OffNominal:
+def off_beside(case: Case, tested: SensorModel, last: Hypothesis, unit: BaseFit) -> OffNominal:
     """Parameters of the tested model that a unit has in another amount, beside the patterns that the search added.
 
     The added patterns, and not the model's own spreads, explain how pixels differ.
@@ -184,12 +184,12 @@ def up_to_named(case: Case, null: Null, values: Floats, rounds: Sequence[Round])
     if explaining:
         end, little = explaining[0], 1.0 - WORTH
         for later in explaining[1:]:
-            if squares_left(null, values, later.prediction) <= little * squares_left(null, values, end.prediction):
-                end = later
+            then, now = (squares_left(null, values, r.start.prediction) for r in (end, later))
+            end = later if now <= little * then else end
     elif right:
-        end = max(right, key=lambda one: (len(one[1].names), -len(one[0].model.effects)))[0]
+        end = max(right, key=lambda one: (len(one[1].names), -len(one[0].start.effects)))[0]
     else:
-        gaps = [gap_of(case, null, values, null.mean, r.prediction).after for r in rounds]
+        gaps = [gap_of(case, null, values, null.mean, r.start.prediction).after for r in rounds]
         end = rounds[int(np.argmin(gaps))]
     return list(rounds) if end is last else [*before, replace(end, fits=())]
 
@@ -204,23 +204,21 @@ def with_given_parameters(problem: Problem, tested: SensorModel, rounds: Sequenc
         problem: the problem of the null model.
         tested: the model under test.
     """
-    *before, last = rounds
-    null, values, names = problem.null, problem.values, {e.name for e in last.model.effects}
-    if names <= {e.name for e in tested.effects} or explanation_of(null, values, rounds).degree not in NEARLY:
+    *before, end = rounds
+    null, values, last = problem.null, problem.values, end.start
+    if last.effects <= {e.name for e in tested.effects} or explanation_of(null, values, rounds).degree not in NEARLY:
         return list(rounds)
     off = off_beside(problem.case, tested, last, last.base)
     count = problem.settings.twins.in_the_end
     cost = count * len(problem.case.conditions)
     if not off.parameters or not problem.allows("parameters as given", cost, needed=True):
         return list(rounds)
-    own = Fit("", {}, {}, last.prediction, off.nominal, last.rho, last.misfit, last.model)
-    given = confirmed(problem, own, count)
-    end = replace(last, base=given.base, prediction=given.prediction, rho=given.rho, misfit=given.misfit)
+    given = confirmed(problem, problem.fit_of("", {}, last.model, off.nominal, last.prediction), count)
     left = squares_left(null, values, given.prediction)
     most = squares_left(null, values, last.prediction) <= (1.0 - WORTH) * left
-    if explanation_of(null, values, [*before, end]).degree not in NEARLY or (left > 0.0 and most):
+    if explanation_of(null, values, [*before, Round(given)]).degree not in NEARLY or (left > 0.0 and most):
         return list(rounds)
-    return [*before, end]
+    return [*before, Round(given)]
 
 
 def named(

@@ -12,7 +12,7 @@ from spikecam_env.gap.baseline.null_model import model_null
 from spikecam_env.gap.candidates.strength import MOST_EXTRAPOLATED, with_effect
 from spikecam_env.gap.compare.distance import effect_size, is_significant, residual
 from spikecam_env.gap.compare.prediction import values_of
-from spikecam_env.gap.fit.candidate import Fit, fit
+from spikecam_env.gap.fit.candidate import fit
 from spikecam_env.gap.fit.confirm import amplified_fit, attenuated, confirmed, with_dark_levels_open
 from spikecam_env.gap.fit.predict import predict_by_twins, with_drawn_pattern
 from spikecam_env.gap.fit.problem import Problem
@@ -82,17 +82,9 @@ def test_a_column_that_few_units_have_is_no_surprise_to_many():
     240 some have.  A larger deviation is still left."""
     case, without = recorded(effect("column_fixed_pattern", sigma_mV=100.0)), null()
     model = with_effect(MODEL, "column_fixed_pattern", {"sigma_mV": 100.0})
-    found = Fit(
-        "column_fixed_pattern",
-        {},
-        {},
-        without.prediction,
-        constrained_refit(model, case.base),
-        without.mean,
-        0.0,
-        model,
-    )
-    found = confirmed(Problem.of(case, MODEL, without, values_of(case.bank, without.keys)), found)
+    problem = Problem.of(case, MODEL, without, values_of(case.bank, without.keys))
+    base = constrained_refit(model, case.base)
+    found = confirmed(problem, problem.fit_of("column_fixed_pattern", {}, model, base, without.prediction))
     few, many = found.prediction, with_drawn_pattern(case, model, without, without.prediction, 240)
     at = next(i for i, k in enumerate(without.keys) if k.name == "over 5" and k.recording == "flat-0.2")
     tops = [float(np.max(p.units[:, at])) for p in (few, many)]

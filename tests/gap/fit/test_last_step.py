@@ -11,8 +11,8 @@ from small import MODEL, unit
 
 from spikecam_env.gap.candidates.strength import with_effect
 from spikecam_env.gap.compare.prediction import Draw, Null, Prediction
-from spikecam_env.gap.fit.candidate import Fit
 from spikecam_env.gap.fit.coordinates import interval_of
+from spikecam_env.gap.fit.hypothesis import Fit
 from spikecam_env.gap.fit.problem import Problem
 from spikecam_env.gap.result import Estimate
 from spikecam_env.gap.search.forward import joined
@@ -76,14 +76,13 @@ def stopped(problem: ByLaw, fraction: float, tau: float) -> Fit:
     there = {"fraction": fraction * TRUE["fraction"], "tau_us": tau * TRUE["tau_us"]}
     model = with_effect(MODEL, NAME, there)
     made = predicted(problem.null, model)
-    rho, left = problem.residual_and_misfit(made)
-    return Fit(NAME, there, {"fraction": 1e-3 * there["fraction"]}, made, unit(), rho, left, model)
+    return problem.fit_of(NAME, there, model, unit(), made, {"fraction": 1e-3 * there["fraction"]})
 
 
 def after_the_search(problem: ByLaw, found: Fit) -> Fit:
     """The fit as a search leaves it."""
     null = problem.null
-    turn = Round(MODEL, unit(), null.prediction, np.zeros(COUNT), problem.misfit(null.prediction), (found,))
+    turn = Round(problem.hypothesis(MODEL, unit(), null.prediction), (found,))
     [last] = joined(problem, [turn], float(COUNT))
     return last.fits[0]
 

@@ -13,8 +13,9 @@ import pytest
 from small import MODEL, effect, problem_of, recorded
 
 from spikecam_env.gap.baseline.null_model import model_null
-from spikecam_env.gap.fit.candidate import Fit, fit
+from spikecam_env.gap.fit.candidate import fit
 from spikecam_env.gap.fit.gauss_newton import derivatives, moved
+from spikecam_env.gap.fit.hypothesis import Fit
 from spikecam_env.gap.fit.predict import predict_by_twins
 from spikecam_env.gap.fit.problem import Problem
 

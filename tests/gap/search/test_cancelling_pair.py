@@ -44,9 +44,9 @@ def test_one_twin_of_both_says_how_strong_they_are(problem):
 @pytest.mark.slow
 def test_search_finds_them_together(problem):
     rounds = forward_selection(problem, [*PAIR, "comparator_delay"], shipped_templates())
-    print([r.fits[0].name for r in rounds if r.fits], rounds[-1].model.effects[-2:])
+    print([r.fits[0].name for r in rounds if r.fits], rounds[-1].start.model.effects[-2:])
     assert [r.fits[0].name for r in rounds[:-1]] == list(PAIR)
-    there = {e.name: e.parameters() for e in rounds[-1].model.effects}
+    there = {e.name: e.parameters() for e in rounds[-1].start.model.effects}
     assert there["dead_time"]["tau_us"] == pytest.approx(TAU_US, rel=0.1)
     assert all(sd > 0 for r in rounds[:-1] for sd in r.fits[0].sd.values())
 

@@ -8,7 +8,7 @@ from small import MODEL, TWINS, made_up_null, recorded, unit
 
 from spikecam_env.gap.compare.distance import residual_and_misfit
 from spikecam_env.gap.compare.prediction import Null, Prediction
-from spikecam_env.gap.fit.candidate import Fit
+from spikecam_env.gap.fit.hypothesis import Fit, Hypothesis
 from spikecam_env.gap.fit.problem import Problem
 from spikecam_env.gap.search.choice import chosen_of
 from spikecam_env.gap.search.rivals import is_rival, lead
@@ -24,7 +24,8 @@ FIT = np.arange(COUNT) < 150
 def a_fit(n: Null, name: str, change, seen) -> Fit:
     prediction = Prediction(n.mean + change, n.sd / np.sqrt(TWINS), n.sd)
     rho, left = residual_and_misfit(n, seen, prediction)
-    return Fit(name, {}, {}, prediction, unit(), rho, left, MODEL)
+    at = Hypothesis(model=MODEL, base=unit(), prediction=prediction, rho=rho, misfit=left)
+    return Fit(**vars(at), name=name, parameters={}, sd={})
 
 
 def campaign():

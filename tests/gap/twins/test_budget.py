@@ -4,19 +4,15 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-import numpy as np
 import pytest
 import small
 from small import effect, recorded
 
 from spikecam_env.cli.diagnose import Diagnose
 from spikecam_env.gap.baseline.off_nominal import OffNominal
-from spikecam_env.gap.compare.distance import residual
 from spikecam_env.gap.compare.prediction import Prediction, values_of
-from spikecam_env.gap.fit.candidate import Fit
 from spikecam_env.gap.report.sentence import sentence, unfinished
 from spikecam_env.gap.search.forward import SECOND
-from spikecam_env.gap.search.round import Round
 from spikecam_env.gap.settings import DiagnosisSettings
 from spikecam_env.gap.twins.budget import CAMPAIGNS, Budget
 from spikecam_env.gap.verdict.comparison import Comparison
@@ -53,9 +49,7 @@ def test_nothing_is_named_where_a_second_effect_was_not_looked_for(left_out: lis
     case = replace(recorded(found), budget=Budget(400, [300], left_out))
     values = values_of(case.bank, null.keys)
     close = Prediction(values, null.noise, null.sd, null.draws)
-    fit = Fit("dead_time", {"tau_us": 0.5}, {"tau_us": 0.01}, close, case.base, np.zeros(len(values)), 1.0, model)
-    first = Round(small.MODEL, case.base, null.prediction, residual(null, values, null.prediction), 900.0, (fit,))
-    rounds = [first, Round(model, case.base, close, fit.rho, 1.0)]
+    rounds = small.found_alone(case, values, model, case.base, close, margin=0.0)
     off = OffNominal({}, case.base)
     comparison = Comparison(case, small.MODEL, small.MODEL, null, values, null.mean, (), off, ())
     said = conclude(comparison, rounds, floor=1.0)

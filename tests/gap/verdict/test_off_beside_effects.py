@@ -12,9 +12,7 @@ from small import effect, recorded
 
 from spikecam_env.gap.baseline.missing_from_refit import Missing
 from spikecam_env.gap.baseline.off_nominal import OffNominal
-from spikecam_env.gap.compare.distance import residual
 from spikecam_env.gap.compare.prediction import Prediction, values_of
-from spikecam_env.gap.fit.candidate import Fit
 from spikecam_env.gap.search.round import Round
 from spikecam_env.gap.settings import DiagnosisSettings
 from spikecam_env.gap.verdict.comparison import Comparison
@@ -49,11 +47,7 @@ def conclusion(left: float = 0.0, read: float = 1.0, margin: float = 0.9):
     noisy = replace(case.base, white=5.0 * case.base.white)
     draws = (replace(null.draws[0], refit=replace(noisy, white=read * noisy.white)),)
     close = Prediction(mean, null.noise, null.sd, draws)
-    fit = Fit("dead_time", {"tau_us": 0.5}, {"tau_us": 0.01}, close, noisy, np.zeros(len(values)), 1.0, model)
-    first = Round(
-        small.MODEL, case.base, null.prediction, residual(null, values, null.prediction), 900.0, (fit,), margin=margin
-    )
-    rounds = [first, Round(model, noisy, close, fit.rho, 1.0)]
+    rounds = small.found_alone(case, values, model, noisy, close, margin)
     off = OffNominal({}, case.base)
     return conclude(Comparison(case, small.MODEL, small.MODEL, null, values, null.mean, (), off, ()), rounds, floor=1.0)
 
@@ -85,7 +79,7 @@ def test_beside_an_effect_that_the_refit_names_a_weak_alarm_is_chance_and_leaves
     least = int(np.argmax(null.freedom))
     off = stats.t.isf(0.004 / count / 2, null.freedom[least]) * null.noise * (np.arange(count) == least)
     values = null.mean + off
-    turn = Round(small.MODEL, case.base, null.prediction, residual(null, values, null.prediction), 900.0)
+    turn = Round(small.problem_of(case, null).hypothesis(small.MODEL, case.base, null.prediction))
     found = (Missing(effect("dark_current", mean_pA=0.4), 0.01),)
     compared = Comparison(case, small.MODEL, small.MODEL, null, values, null.mean, found, OffNominal({}, case.base), ())
     said = conclude(compared, [turn], floor=1.0)

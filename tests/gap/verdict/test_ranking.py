@@ -7,7 +7,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from spikecam_env.gap.fit.candidate import Fit
+from spikecam_env.gap.fit.hypothesis import Fit, Hypothesis
 from spikecam_env.gap.result import why_rejected
 from spikecam_env.gap.search.round import Round
 from spikecam_env.gap.verdict.ranking import ranking
@@ -16,13 +16,18 @@ from spikecam_env.sensor import SensorModel
 MODEL = SensorModel.preset("scsim")
 
 
+def at(misfit: float, prediction: object = None) -> Hypothesis:
+    rho = np.array([1.5, -4.0])
+    return Hypothesis(model=MODEL, base=None, prediction=prediction, rho=rho, misfit=misfit)  # type: ignore[arg-type]
+
+
 def fit(name: str, misfit: float, draws: int = 1) -> Fit:
     prediction = SimpleNamespace(draws=(None,) * draws)
-    return Fit(name, {}, {}, prediction, None, np.array([1.5, -4.0]), misfit, MODEL)  # type: ignore[arg-type]
+    return Fit(**vars(at(misfit, prediction)), name=name, parameters={}, sd={})
 
 
 def turn(*fits: Fit, misfit: float = 100.0) -> Round:
-    return Round(MODEL, None, None, np.zeros(2), misfit, fits)  # type: ignore[arg-type]
+    return Round(at(misfit), fits)
 
 
 def test_a_better_candidate_below_the_kept_one_says_why() -> None:
