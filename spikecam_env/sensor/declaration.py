@@ -11,7 +11,7 @@ from typing import Any
 from spikecam_env.errors import InputError, shown, unknown_name
 from spikecam_env.sensor.effect_sheet import Sheet
 from spikecam_env.sensor.effects.base import Effect, Stage
-from spikecam_env.sensor.effects.identification import Identification, Needs
+from spikecam_env.sensor.effects.identification import Identification, Needs, Response
 from spikecam_env.sensor.own_hooks import CHECKS
 
 NAME = re.compile(r"[a-z][a-z0-9]*(_[a-z0-9]+)*")
@@ -73,6 +73,9 @@ def _check_identification(effect: type[Effect], known: Mapping[str, Field[Any]])
     declared = effect.identification
     if not isinstance(declared, Identification) or not isinstance(declared.needs, Needs):
         raise _wrong(effect, "its identification is none; write identification = Identification(needs=Needs.STEADY)")
+    if not isinstance(declared.response, Response):
+        kinds = ", ".join(kind.name for kind in Response)
+        raise _wrong(effect, f"its response is none; write response=Response.X, one of {kinds}")
     for name in (*declared.fitted, *declared.shapes, *((declared.share or ())[:1])):
         if name not in known:
             raise unknown_name(f"parameter of {effect.name} in its identification", name, known)

@@ -11,7 +11,7 @@ from spikecam_env.errors import unknown_name
 from spikecam_env.gap.observe.conditions import STEADY_KNOWN, Condition
 from spikecam_env.gap.observe.observation import ObservedRecording
 from spikecam_env.sensor import CATALOGUE, Effect, SensorModel
-from spikecam_env.sensor.effects.identification import Identification, Needs
+from spikecam_env.sensor.effects.identification import Identification, Needs, Response
 
 BENDING = ("saturation", "reset")
 """Families of effects that bend the rate curve."""
@@ -37,8 +37,13 @@ class Candidate(Identification):
 
     @property
     def power(self) -> float:
-        """Of the strength, that statistics are in proportion to: events are counted, on a scale of roots."""
-        return 2.0 if self.square else 0.5 if self.events else 1.0
+        """Power of the strength that statistics are in proportion to."""
+        return self.response.power
+
+    @property
+    def random_course(self) -> bool:
+        """Whether its course in time is drawn anew every time: it changes the scatter of statistics, and no mean."""
+        return self.response is Response.COURSE
 
     @property
     def is_pattern(self) -> bool:
@@ -50,7 +55,7 @@ class Candidate(Identification):
     def is_linear(self) -> bool:
         """Whether statistics go in proportion to its strength for long: noise goes by its square, and its bands and
         lateness are logarithms, which are not."""
-        return self.power == 1.0 and not (self.mixed or self.random_course or self.is_pattern)
+        return self.response is Response.LINEAR and not self.is_pattern
 
     @property
     def of_motion(self) -> bool:

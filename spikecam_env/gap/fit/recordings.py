@@ -10,10 +10,13 @@ from spikecam_env.gap.candidates.table import Candidates, candidate
 from spikecam_env.gap.compare.distance import CLEAR
 from spikecam_env.gap.compare.prediction import Null
 from spikecam_env.gap.twins.case import Case, refit_recordings
+from spikecam_env.sensor.effects.identification import Response
 from spikecam_env.types import Floats
 
 OF_EVENTS = 3
 """Twins of a sparse or mixed effect."""
+
+SPARSE_OR_MIXED = (Response.EVENTS, Response.FEW_PIXELS, Response.MIXED)
 
 OF_RANDOM_COURSE = 2 * OF_EVENTS
 """Twins of an effect of random course: their scatter counts."""
@@ -22,11 +25,10 @@ OF_RANDOM_COURSE = 2 * OF_EVENTS
 def twins_of(name: str) -> int:
     """Number of twins for an effect.
 
-    Several of a sparse one (few events, few random pixels) or a `mixed` one.  These cannot be simulated stronger to
+    Several of a sparse one (few events, few random pixels) or a mixed one.  These cannot be simulated stronger to
     exceed one twin's noise.
     """
-    effect = candidate(name)
-    return OF_EVENTS if effect.events or effect.few_pixels or effect.mixed else 1
+    return OF_EVENTS if candidate(name).response in SPARSE_OR_MIXED else 1
 
 
 def recordings_affected(case: Case, names: Sequence[str], null: Null, measured: Floats, effect: Floats) -> list[int]:

@@ -22,6 +22,7 @@ from spikecam_env.gap.screen.templates import Templates
 from spikecam_env.gap.settings import Searching
 from spikecam_env.gap.statistics.spectrum import frequency, spectrum, strongest_line
 from spikecam_env.gap.twins.case import Case
+from spikecam_env.sensor.effects.identification import Response
 from spikecam_env.types import Floats
 
 LEAST_SPIKES = 1000
@@ -95,7 +96,7 @@ def starts_to_fit(
 
 def takes_several_twins(name: str) -> bool:
     """Whether one twin of a candidate says little of its like."""
-    return candidate(name).random_course or candidate(name).few_pixels
+    return candidate(name).response in (Response.COURSE, Response.FEW_PIXELS)
 
 
 def groups_that_stand_out(null: Null, distance: Floats) -> set[str]:

@@ -27,6 +27,7 @@ from spikecam_env.gap.verdict.score import (
     strength_of,
 )
 from spikecam_env.sensor import SensorModel
+from spikecam_env.sensor.effects.identification import Response
 from spikecam_env.types import Floats
 
 SAFETY = 2.0
@@ -54,7 +55,7 @@ class TemplateProbe(EffectProbe):
     def __init__(self, case: Case, model: SensorModel, null: Null, templates: Templates, entry: Template):
         super().__init__(case, model, null, entry.name)
         known = candidate(entry.name)
-        by_chance = known.events or (known.is_pattern and known.share is None)
+        by_chance = known.response is Response.EVENTS or (known.is_pattern and known.share is None)
         self.resolution, self.safety = FINE, SAFETY_OF_CHANCE if by_chance else SAFETY
         self.template = rescaled(templates, entry, null, case.conditions, case.shape)
         of_pattern = np.array([k.group == "pattern" for k in null.keys])

@@ -28,7 +28,7 @@ class NewEffect(Effect):
     # Hints to a diagnosis besides the law; all of it may be left out.  The common entries:
     #   fitted=("loss", "tau_us")             parameters to fit, the strength first; left out: the strength alone
     #   shapes={"tau_us": (100.0, 1000.0)}    values of other parameters to start from
-    #   square=True                           of a noise, whose statistics go with the square of its strength
+    #   response=Response.QUADRATIC           of a noise: statistics are in proportion to the square of its strength
     # Needs: recordings without which it cannot be seen, STEADY, LEVELS, DARK, EVEN, MOTION, EDGES, BRIGHT or NOTHING.
     identification = Identification(needs=Needs.STEADY)
 

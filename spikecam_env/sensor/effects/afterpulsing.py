@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from spikecam_env.sensor.effects.base import Acts, Effect, ExposureBlock, Stage, parameter
-from spikecam_env.sensor.effects.identification import Identification, Needs
+from spikecam_env.sensor.effects.identification import Identification, Needs, Response
 from spikecam_env.types import Masks
 
 
@@ -40,8 +40,8 @@ class Afterpulsing(Effect):
     identification = Identification(
         family="readout",
         shapes={"delay_frames": (1, 2, 3, 4, 6)},
+        response=Response.EVENTS,
         needs=Needs.STEADY,
-        events=True,
         share=("probability", "spikes"),
     )
 

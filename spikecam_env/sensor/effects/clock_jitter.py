@@ -17,7 +17,7 @@ from typing import NamedTuple
 import numpy as np
 
 from spikecam_env.sensor.effects.base import Acts, Bend, Charge, Effect, ExposureBlock, Stage, parameter
-from spikecam_env.sensor.effects.identification import Identification, Needs
+from spikecam_env.sensor.effects.identification import Identification, Needs, Response
 from spikecam_env.types import Floats
 
 
@@ -37,7 +37,7 @@ class ClockJitter(Effect):
     acts = Acts.INTEGRATED
     strength = "sigma_ns"
     wants_rise = True
-    identification = Identification(family="common", square=True, needs=Needs.STEADY)
+    identification = Identification(family="common", response=Response.QUADRATIC, needs=Needs.STEADY)
 
     def begin(self, first: ExposureBlock, pattern: np.random.Generator, rng: np.random.Generator) -> Edge:
         return Edge(rng.standard_normal(), rng)

@@ -16,7 +16,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from spikecam_env.sensor.effects.base import Acts, Effect, ExposureBlock, Shift, Stage, parameter
-from spikecam_env.sensor.effects.identification import Identification, Needs
+from spikecam_env.sensor.effects.identification import Identification, Needs, Response
 
 
 @dataclass(frozen=True)
@@ -26,7 +26,7 @@ class CommonThresholdNoise(Effect):
     stage = Stage.THRESHOLD
     acts = Acts.DRAWN
     strength = "sigma_mV"
-    identification = Identification(family="common", square=True, needs=Needs.STEADY)
+    identification = Identification(family="common", response=Response.QUADRATIC, needs=Needs.STEADY)
 
     def compare(self, now: ExposureBlock, memory: np.random.Generator) -> tuple[Shift, np.random.Generator]:
         return Shift(millivolts=self.sigma_mV * memory.standard_normal((now.frames, 1, 1))), memory

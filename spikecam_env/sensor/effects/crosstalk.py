@@ -23,7 +23,7 @@ from typing import Any
 import numpy as np
 
 from spikecam_env.sensor.effects.base import Acts, Effect, ExposureBlock, Feedback, Stage, neighbour_sum, parameter
-from spikecam_env.sensor.effects.identification import Identification, Needs
+from spikecam_env.sensor.effects.identification import Identification, Needs, Response
 from spikecam_env.types import Floats, Masks
 
 
@@ -36,7 +36,7 @@ class Crosstalk(Effect):
     stage = Stage.RESET
     acts = Acts.CROSSING
     strength = "kick"
-    identification = Identification(family="coupling", mixed=True, needs=Needs.STEADY)
+    identification = Identification(family="coupling", response=Response.MIXED, needs=Needs.STEADY)
 
     def spiked(
         self, charge: Floats, spikes: Masks, rate: Floats, now: ExposureBlock, memory: Any

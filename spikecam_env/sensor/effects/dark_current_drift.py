@@ -14,7 +14,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from spikecam_env.sensor.effects.base import Acts, Charge, Effect, ExposureBlock, Stage, parameter
-from spikecam_env.sensor.effects.identification import Identification, Needs
+from spikecam_env.sensor.effects.identification import Identification, Needs, Response
 from spikecam_env.sensor.frame_moments import mean_decay
 
 
@@ -27,7 +27,11 @@ class DarkCurrentDrift(Effect):
     acts = Acts.INTEGRATED
     strength = "rise"
     identification = Identification(
-        family="dark", fitted=("rise", "tau_ms"), shapes={"tau_ms": (10.0, 50.0, 200.0)}, mixed=True, needs=Needs.DARK
+        family="dark",
+        fitted=("rise", "tau_ms"),
+        shapes={"tau_ms": (10.0, 50.0, 200.0)},
+        response=Response.MIXED,
+        needs=Needs.DARK,
     )
 
     def collect(self, light: Charge, dark: Charge, now: ExposureBlock, memory: Any) -> tuple[Charge, Charge, Any]:

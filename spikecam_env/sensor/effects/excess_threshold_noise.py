@@ -15,7 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from spikecam_env.sensor.effects.base import Acts, Effect, Stage, parameter
-from spikecam_env.sensor.effects.identification import Identification, Needs
+from spikecam_env.sensor.effects.identification import Identification, Needs, Response
 from spikecam_env.sensor.unit import PixelArray
 
 
@@ -26,7 +26,7 @@ class ExcessThresholdNoise(Effect):
     stage = Stage.THRESHOLD
     acts = Acts.CROSSING
     strength = "sigma_mV"
-    identification = Identification(family="noise", square=True, needs=Needs.STEADY)
+    identification = Identification(family="noise", response=Response.QUADRATIC, needs=Needs.STEADY)
 
     def imprint(self, pixels: PixelArray, rng: np.random.Generator) -> PixelArray:
         return pixels.with_reset_noise(self.sigma_mV)

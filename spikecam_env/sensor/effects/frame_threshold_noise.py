@@ -15,7 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from spikecam_env.sensor.effects.base import Acts, Effect, ExposureBlock, Shift, Stage, parameter
-from spikecam_env.sensor.effects.identification import Identification, Needs
+from spikecam_env.sensor.effects.identification import Identification, Needs, Response
 from spikecam_env.sensor.random_fields import Words, white_field, words
 
 
@@ -26,7 +26,7 @@ class FrameThresholdNoise(Effect):
     stage = Stage.THRESHOLD
     acts = Acts.DRAWN
     strength = "sigma_mV"
-    identification = Identification(family="noise", square=True, needs=Needs.STEADY)
+    identification = Identification(family="noise", response=Response.QUADRATIC, needs=Needs.STEADY)
 
     def begin(self, first: ExposureBlock, pattern: np.random.Generator, rng: np.random.Generator) -> Words:
         return words(rng)

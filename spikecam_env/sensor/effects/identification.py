@@ -38,6 +38,36 @@ class Needs(Enum):
     """Flats or a dark: steady light that is known for every pixel."""
 
 
+class Response(Enum):
+    """How the statistics of recordings respond to the strength of an effect.
+
+    Example:
+        >>> from spikecam_env.sensor import CATALOGUE
+        >>> sorted(name for name, effect in CATALOGUE.items() if effect.identification.response is Response.EVENTS)
+        ['afterpulsing', 'missed_spikes', 'spurious_spikes']
+        >>> Response.QUADRATIC.power
+        2.0
+    """
+
+    LINEAR = auto()
+    """In proportion to it."""
+    QUADRATIC = auto()
+    """In proportion to its square, as those of a noise."""
+    MIXED = auto()
+    """Some in proportion to it, others to its square."""
+    EVENTS = auto()
+    """By single events, so few that their number differs much between simulations."""
+    FEW_PIXELS = auto()
+    """As `QUADRATIC`, in a few pixels, others in every simulated unit."""
+    COURSE = auto()
+    """By their scatter, in proportion to its square: its course in time is drawn anew every time."""
+
+    @property
+    def power(self) -> float:
+        """Power of the strength that statistics are in proportion to: events are counted, on a scale of roots."""
+        return {Response.LINEAR: 1.0, Response.MIXED: 1.0, Response.EVENTS: 0.5}.get(self, 2.0)
+
+
 MORE_LEVELS = "flats at more levels, up to 0.9 spikes a frame, and bars of several brightnesses"
 SECOND_V_D = "flats at a second V_d"
 """Experiments that separate the members of a class."""
@@ -60,10 +90,8 @@ class Identification:
     """Parameters that are fitted, the strength first; empty: the strength alone."""
     shapes: Mapping[str, tuple[float, ...]] = field(default_factory=dict)
     """Values of other parameters to start from."""
-    square: bool = False
-    """Statistics go with the square of the strength, as those of a noise do."""
-    mixed: bool = False
-    """Some statistics go with the strength, others with its square."""
+    response: Response = Response.LINEAR
+    """How statistics respond to the strength."""
     needs: Needs = Needs.NOTHING
     acts_through: tuple[str, ...] = ()
     """Effects of a model through which it shows in recordings that could not show it by itself."""
@@ -71,12 +99,6 @@ class Identification:
     """Of these, effects that show as little without it, and start values of parameters for a fit of both at once."""
     only_contrast: bool = False
     """It changes nothing in light that is steady and uniform."""
-    random_course: bool = False
-    """Its course in time is drawn anew every time: it changes no mean, but the scatter of statistics."""
-    events: bool = False
-    """It is single events, so few that their number differs much between simulations."""
-    few_pixels: bool = False
-    """It is in a few pixels, others in every simulated unit."""
     share: tuple[str, str] | None = None
     """The parameter that is a countable share, and of `pixels`, `spikes`, or `frames` of pixels."""
     shape_step: float = -0.5

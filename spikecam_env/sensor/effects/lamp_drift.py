@@ -17,7 +17,7 @@ from typing import NamedTuple
 import numpy as np
 
 from spikecam_env.sensor.effects.base import Acts, Charge, Effect, ExposureBlock, Stage, parameter
-from spikecam_env.sensor.effects.identification import Identification, Needs
+from spikecam_env.sensor.effects.identification import Identification, Needs, Response
 
 
 class Walk(NamedTuple):
@@ -39,7 +39,7 @@ class LampDrift(Effect):
     stage = Stage.OPTICS
     acts = Acts.INTEGRATED
     strength = "sigma_per_root_s"
-    identification = Identification(family="light", square=True, needs=Needs.STEADY, random_course=True)
+    identification = Identification(family="light", response=Response.COURSE, needs=Needs.STEADY)
 
     def begin(self, first: ExposureBlock, pattern: np.random.Generator, rng: np.random.Generator) -> Walk:
         return Walk(0.0, rng, rng.spawn(1)[0])

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from spikecam_env.sensor.effects.base import Acts, Charge, Effect, ExposureBlock, Stage, parameter
-from spikecam_env.sensor.effects.identification import Identification, Needs
+from spikecam_env.sensor.effects.identification import Identification, Needs, Response
 from spikecam_env.sensor.frame_moments import wave_moments
 
 
@@ -29,7 +29,7 @@ class LightFlicker(Effect):
     strength = "modulation"
     wants_rise = True
     identification = Identification(
-        family="light", shapes={"frequency_hz": (100.0, 400.0, 2000.0)}, square=True, needs=Needs.STEADY
+        family="light", shapes={"frequency_hz": (100.0, 400.0, 2000.0)}, response=Response.QUADRATIC, needs=Needs.STEADY
     )
 
     def collect(self, light: Charge, dark: Charge, now: ExposureBlock, memory: Any) -> tuple[Charge, Charge, Any]:

@@ -15,7 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from spikecam_env.sensor.effects.base import Acts, Effect, ExposureBlock, Stage, parameter
-from spikecam_env.sensor.effects.identification import Identification, Needs
+from spikecam_env.sensor.effects.identification import Identification, Needs, Response
 from spikecam_env.types import Masks
 
 
@@ -26,7 +26,9 @@ class MissedSpikes(Effect):
     stage = Stage.READOUT
     acts = Acts.END
     strength = "probability"
-    identification = Identification(family="readout", needs=Needs.STEADY, events=True, share=("probability", "spikes"))
+    identification = Identification(
+        family="readout", response=Response.EVENTS, needs=Needs.STEADY, share=("probability", "spikes")
+    )
 
     def read_out(
         self, spikes: Masks, now: ExposureBlock, memory: np.random.Generator

@@ -21,7 +21,7 @@ import scipy
 from numpy.typing import NDArray
 
 from spikecam_env.sensor.effects.base import Acts, Effect, Stage, parameter
-from spikecam_env.sensor.effects.identification import Identification, Needs
+from spikecam_env.sensor.effects.identification import Identification, Needs, Response
 
 _NO_BLUR = 1e-9
 """[pixels] Below, the neighbours' weight is under 1e-18, and no float32 moves by it."""
@@ -34,7 +34,7 @@ class OpticalBlur(Effect):
     stage = Stage.OPTICS
     acts = Acts.CONSTANT
     strength = "sigma_pixels"
-    identification = Identification(family="optics", square=True, needs=Needs.EDGES, only_contrast=True)
+    identification = Identification(family="optics", response=Response.QUADRATIC, needs=Needs.EDGES, only_contrast=True)
 
     def image(self, radiance: NDArray[np.float32]) -> NDArray[np.float32]:
         if self.sigma_pixels < _NO_BLUR:

@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from spikecam_env.sensor.effects.base import Acts, Charge, Effect, ExposureBlock, Few, Stage, parameter
-from spikecam_env.sensor.effects.identification import Identification, Needs
+from spikecam_env.sensor.effects.identification import Identification, Needs, Response
 from spikecam_env.types import Floats
 
 AHEAD = 4096
@@ -60,9 +60,8 @@ class RandomTelegraphNoise(Effect):
         family="dark",
         fitted=("amplitude_pA", "fraction", "dwell_ms"),
         shapes={"dwell_ms": (0.5, 3.0, 20.0)},
-        square=True,
+        response=Response.FEW_PIXELS,
         needs=Needs.STEADY,
-        few_pixels=True,
         share=("fraction", "pixels"),
     )
 

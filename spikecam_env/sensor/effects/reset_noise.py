@@ -16,7 +16,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from spikecam_env.sensor.effects.base import Acts, Effect, Stage, parameter
-from spikecam_env.sensor.effects.identification import SECOND_V_D, Identification, Needs
+from spikecam_env.sensor.effects.identification import SECOND_V_D, Identification, Needs, Response
 from spikecam_env.sensor.unit import PixelArray
 
 
@@ -27,7 +27,9 @@ class ResetNoise(Effect):
     stage = Stage.THRESHOLD
     acts = Acts.CROSSING
     strength = "sigma_mV"
-    identification = Identification(family="noise", square=True, needs=Needs.STEADY, experiment=SECOND_V_D)
+    identification = Identification(
+        family="noise", response=Response.QUADRATIC, needs=Needs.STEADY, experiment=SECOND_V_D
+    )
 
     def imprint(self, pixels: PixelArray, rng: np.random.Generator) -> PixelArray:
         return pixels.with_reset_noise(self.sigma_mV)

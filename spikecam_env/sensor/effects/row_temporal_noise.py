@@ -15,7 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from spikecam_env.sensor.effects.base import Acts, Effect, ExposureBlock, Shift, Stage, parameter
-from spikecam_env.sensor.effects.identification import Identification, Needs
+from spikecam_env.sensor.effects.identification import Identification, Needs, Response
 
 
 @dataclass(frozen=True)
@@ -25,7 +25,7 @@ class RowTemporalNoise(Effect):
     stage = Stage.THRESHOLD
     acts = Acts.DRAWN
     strength = "sigma_mV"
-    identification = Identification(family="common", square=True, needs=Needs.STEADY)
+    identification = Identification(family="common", response=Response.QUADRATIC, needs=Needs.STEADY)
 
     def compare(self, now: ExposureBlock, memory: np.random.Generator) -> tuple[Shift, np.random.Generator]:
         return Shift(millivolts=self.sigma_mV * memory.standard_normal((now.frames, now.shape[0], 1))), memory

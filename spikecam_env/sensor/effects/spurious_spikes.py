@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from spikecam_env.sensor.effects.base import Acts, Effect, ExposureBlock, Stage, parameter
-from spikecam_env.sensor.effects.identification import Identification, Needs
+from spikecam_env.sensor.effects.identification import Identification, Needs, Response
 from spikecam_env.types import Masks
 
 _AT_ONCE = 256
@@ -42,7 +42,9 @@ class SpuriousSpikes(Effect):
     stage = Stage.READOUT
     acts = Acts.END
     strength = "probability"
-    identification = Identification(family="readout", needs=Needs.STEADY, events=True, share=("probability", "frames"))
+    identification = Identification(
+        family="readout", response=Response.EVENTS, needs=Needs.STEADY, share=("probability", "frames")
+    )
 
     def begin(self, first: ExposureBlock, pattern: np.random.Generator, rng: np.random.Generator) -> Strikes:
         return Strikes(np.array([-1]), rng)

@@ -20,7 +20,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from spikecam_env.sensor.effects.base import PARTS_OF_A_CYCLE, Acts, Effect, ExposureBlock, Shift, Stage, parameter
-from spikecam_env.sensor.effects.identification import Identification, Needs
+from spikecam_env.sensor.effects.identification import Identification, Needs, Response
 from spikecam_env.types import Floats
 
 
@@ -34,7 +34,10 @@ class SupplyRipple(Effect):
     acts = Acts.CROSSING
     strength = "ripple"
     identification = Identification(
-        family="common", shapes={"frequency_hz": (100.0, 400.0, 2000.0)}, square=True, needs=Needs.STEADY
+        family="common",
+        shapes={"frequency_hz": (100.0, 400.0, 2000.0)},
+        response=Response.QUADRATIC,
+        needs=Needs.STEADY,
     )
 
     def parts(self, frame_rate_hz: float) -> int:

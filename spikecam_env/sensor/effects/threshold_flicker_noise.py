@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from spikecam_env.sensor.effects.base import Acts, Effect, ExposureBlock, Shift, Stage, parameter
-from spikecam_env.sensor.effects.identification import Identification, Needs
+from spikecam_env.sensor.effects.identification import Identification, Needs, Response
 from spikecam_env.sensor.random_fields import Words, octave_field, words
 
 
@@ -41,7 +41,7 @@ class ThresholdFlickerNoise(Effect):
     stage = Stage.THRESHOLD
     acts = Acts.DRAWN
     strength = "sigma_mV"
-    identification = Identification(family="noise", square=True, needs=Needs.STEADY)
+    identification = Identification(family="noise", response=Response.QUADRATIC, needs=Needs.STEADY)
 
     def begin(self, first: ExposureBlock, pattern: np.random.Generator, rng: np.random.Generator) -> Octaves:
         shape = (int(self.octaves), *first.shape)
