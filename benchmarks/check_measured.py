@@ -14,8 +14,8 @@ import tyro
 from numpy.typing import NDArray
 from tqdm import tqdm
 
-from spikecam_env.calibration.flat_maps import counted, read_flat_maps, spread_counts
 from spikecam_env.calibration.spike_times import plausible_rates
+from spikecam_env.campaign.flat_maps import counted, read_flat_maps, spread_counts
 from spikecam_env.sensor import SensorModel, SpikeSensor
 from spikecam_env.types import Floats
 from tools.real.recordings import (

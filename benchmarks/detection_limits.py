@@ -22,7 +22,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from spikecam_env.gap.acquisition.design import standard_design
+from spikecam_env.campaign.design import standard_design
 from spikecam_env.gap.baseline.off_nominal import USUAL_NOISE
 from spikecam_env.gap.candidates.strength import bounded, with_effect
 from spikecam_env.gap.candidates.table import candidate

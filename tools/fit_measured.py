@@ -16,7 +16,7 @@ import numpy as np
 import tyro
 from scipy import optimize, special
 
-from spikecam_env.calibration.flat_maps import LUX, counted, spread_counts
+from spikecam_env.campaign.flat_maps import LUX, counted, spread_counts
 from spikecam_env.sensor import Circuit, SensorModel
 from spikecam_env.types import Floats
 from spikecam_env.whole import whole_file

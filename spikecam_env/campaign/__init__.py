@@ -1,4 +1,4 @@
-"""Campaigns: a folder of recordings of one camera with the light that it saw: read, written and simulated."""
+"""Campaigns: a folder of recordings of one camera with the light that it saw: designed, simulated, imported, read."""
 
 from spikecam_env.campaign.reading import Campaign, CampaignRecording, read_campaign
 from spikecam_env.campaign.takes import PlannedRecording, at_v_d, record_takes

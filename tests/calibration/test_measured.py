@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from benchmarks.check_measured import clock_locking, flat_quantiles, simulated_wall
-from spikecam_env.calibration.flat_maps import FRAMES, FlatMaps, read_flat_maps
+from spikecam_env.campaign.flat_maps import FRAMES, FlatMaps, read_flat_maps
 from spikecam_env.errors import InputError
 from spikecam_env.sensor import SensorModel, SpikeSensor
 from tools.fit_measured import (

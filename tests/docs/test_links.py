@@ -37,11 +37,3 @@ def test_every_link_within_the_repository_leads_somewhere(page: Path) -> None:
         assert target.is_relative_to(ROOT), f"{link[0]} leads out of the repository"
         if anchor and target.suffix == ".md":
             assert anchor in headings(target), f"{link[0]}: no such heading"
-
-
-def test_files_of_the_glossary_are_there() -> None:
-    """Relative to the checkout, or to the folder that the page names."""
-    text = (ROOT / "docs" / "glossary.md").read_text(encoding="utf-8")
-    files = re.findall(r"`([\w/]+\.py)`", text)
-    gone = [f for f in files if not any((ROOT / folder / f).is_file() for folder in (".", "spikecam_env/gap"))]
-    assert len(files) > 50 and not gone, f"the glossary names files that are not there: {gone}"

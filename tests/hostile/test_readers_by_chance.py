@@ -18,10 +18,10 @@ from hypothesis.extra import numpy as hnp
 from mutations import npz
 from tally import reads_or_refuses
 
-from spikecam_env.calibration.flat_maps import read_flat_maps
+from spikecam_env.campaign.flat_maps import read_flat_maps
+from spikecam_env.campaign.labels import labels_from_table
 from spikecam_env.campaign.reading import read_campaign, read_light, read_rates
 from spikecam_env.datasets.manifest import Manifest
-from spikecam_env.gap.acquisition.labels import labels_from_table
 from spikecam_env.sensor import SensorModel
 from spikecam_env.streams import read_recording
 from spikecam_env.untrusted import array_names, read_arrays, read_json, read_toml

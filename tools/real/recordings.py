@@ -14,9 +14,9 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from spikecam_env.calibration.flat_maps import read_flat_maps
 from spikecam_env.calibration.response import rates_from_times
 from spikecam_env.calibration.spike_times import SpikeTimes, ideal_second_difference, spike_times
+from spikecam_env.campaign.flat_maps import read_flat_maps
 from spikecam_env.compiled import njit
 from spikecam_env.errors import InputError
 from spikecam_env.streams import pack_frames

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 import scipy
 
-from spikecam_env.calibration.flat_maps import DIM_LUX, FRAMES, LUX, FlatMaps
+from spikecam_env.campaign.flat_maps import DIM_LUX, FRAMES, LUX, FlatMaps
 from spikecam_env.robust import scatter
 from spikecam_env.types import Floats
 

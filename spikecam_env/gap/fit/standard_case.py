@@ -5,7 +5,7 @@ Templates are made of it (`standard_templates`), and benchmarks measure by it.
 
 from __future__ import annotations
 
-from spikecam_env.gap.acquisition.design import standard_design
+from spikecam_env.campaign.design import standard_design
 from spikecam_env.gap.baseline.null_model import model_null
 from spikecam_env.gap.compare.prediction import Null
 from spikecam_env.gap.observe.conditions import planned_conditions

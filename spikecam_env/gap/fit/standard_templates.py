@@ -17,8 +17,8 @@ from pathlib import Path
 from tqdm import tqdm
 
 from spikecam_env.cache_folder import cache_folder
+from spikecam_env.campaign.design import standard_design
 from spikecam_env.errors import InputError
-from spikecam_env.gap.acquisition.design import standard_design
 from spikecam_env.gap.candidates.strength import bounded
 from spikecam_env.gap.compare.prediction import Null
 from spikecam_env.gap.fit import standard_case

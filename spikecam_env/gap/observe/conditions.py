@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from spikecam_env.campaign.reading import CampaignRecording
-from spikecam_env.gap.acquisition.recording_kinds import Planned
+from spikecam_env.campaign.recording_kinds import Planned
 from spikecam_env.sensor import Keyframes
 from spikecam_env.types import Masks
 

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from spikecam_env.gap.acquisition.design import standard_design
+from spikecam_env.campaign.design import standard_design
 from spikecam_env.gap.candidates.table import candidate
 from spikecam_env.gap.compare.prediction import Null
 from spikecam_env.gap.observe.conditions import planned_conditions

@@ -5,7 +5,7 @@ in any other unit proportional to light go through `radiance_per_unit`, the radi
 
 Rates are an npz with `rate` (H, W) [spikes/frame] and `frames` it was counted over.
 
-Flat maps (`calibration.flat_maps`) become recordings of rates, lit and dark, and where its counts are known the one at
+Flat maps (`campaign.flat_maps`) become recordings of rates, lit and dark, and where its counts are known the one at
 153 lux, which is held out.  The radiance of 335 lux is not known, so the lit one is labelled by the camera itself,
 `relative`: radiance is the median over pixels of its rate less the dark's.  By this label the median pixel has gain 1;
 only the differences between pixels, and the dark, can disagree with a model.
@@ -22,14 +22,13 @@ import numpy as np
 from numpy.typing import NDArray
 from tqdm import tqdm
 
-from spikecam_env.calibration import flat_maps
-from spikecam_env.calibration.flats import even_light
-from spikecam_env.campaign import Campaign, read_campaign
+from spikecam_env.campaign import Campaign, flat_maps, read_campaign
+from spikecam_env.campaign.flats import even_light
+from spikecam_env.campaign.labels import READING, RELATIVE, UNKNOWN, Label
 from spikecam_env.campaign.reading import USES, read_light, read_rates
 from spikecam_env.campaign.writing import finish_campaign, save_light, save_rates, save_spikes
 from spikecam_env.checked import checked_number
 from spikecam_env.errors import InputError, unknown_name
-from spikecam_env.gap.acquisition.labels import READING, RELATIVE, UNKNOWN, Label
 from spikecam_env.names import file_name, inside
 from spikecam_env.sensor import Keyframes
 from spikecam_env.sensor.model import FRAME_RATES_HZ

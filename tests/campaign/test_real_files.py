@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from spikecam_env.calibration import calibrate
+from spikecam_env.campaign import real_files
 from spikecam_env.errors import InputError
 from spikecam_env.gap import Dark, Flat, Label, Step, import_campaign, labels_from_table, write_campaign
-from spikecam_env.gap.acquisition import real_files
 from spikecam_env.sensor import Keyframes
 from spikecam_env.streams import SpikeWriter, save_npz, save_vidar_dat
 from tools.real_recordings import REAL

@@ -7,8 +7,8 @@ from dataclasses import replace
 from pathlib import Path
 
 from spikecam_env.campaign import Campaign, PlannedRecording, record_takes
+from spikecam_env.campaign.recording_kinds import Bars, Dark, Disk, Flat, Planned, Step
 from spikecam_env.checked import checked_count, checked_disk, checked_shape
-from spikecam_env.gap.acquisition.recording_kinds import Bars, Dark, Disk, Flat, Planned, Step
 from spikecam_env.sensor import SensorModel
 from spikecam_env.streams.packing import packed_bytes
 
