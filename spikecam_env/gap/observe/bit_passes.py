@@ -39,7 +39,6 @@ def through_pixels(
     bits = np.empty((64, (frames + 63) // 64), np.uint64)
     t = np.empty(frames + 1, np.int32)
     d = np.empty(frames + 1, np.int32)
-    block = (frames + blocks.shape[0] - 1) // blocks.shape[0]
     counts = np.zeros((4, lengths.size), np.int64)
     for column in range(words.shape[1]):
         by_pixel(words, column, bits)
@@ -50,45 +49,21 @@ def through_pixels(
                 break
             n = times_of(bits[within], t)
             fill_ends_and_differences(t, n, steps, ends[p], square[p], terms[p])
-            if n == 0:
-                continue
-            i = 0
-            for b in range(blocks.shape[0]):
-                start, stop = i, min((b + 1) * block, frames)
-                i = np.searchsorted(t[:n], stop)
-                blocks[b, p] = i - start
+            if n > 0:
+                _fill_blocks(t[:n], frames, blocks[:, p])
             if n < 2:
                 continue
-            least, most = np.int32(frames), np.int32(0)
-            for i in range(n - 1):
-                d[i] = t[i + 1] - t[i]
-                least, most = min(least, d[i]), max(most, d[i])
+            least, most = _fill_intervals(t[:n], d)
             _count(d[: n - 1], least, most, counts)
             if n < 4:
                 continue
             mean = (t[n - 1] - t[0]) / (n - 1)
-            squares, products = np.int64(0), np.int64(0)
-            for i in range(n - 1):
-                squares += np.int64(d[i]) * d[i]
-            for i in range(n - 2):
-                products += np.int64(d[i]) * d[i + 1]
-            variance = squares / (n - 1) - mean * mean
-            # sum (d - m)(d' - m) = sum d d' - m (sum d + sum d') + (n - 2) m^2
-            inner = 2.0 * (t[n - 1] - t[0]) - d[0] - d[n - 2]
-            moments[p, 0], moments[p, 1] = variance, (products - mean * inner) / (n - 2) + mean * mean
-            whole = np.int32(np.round(mean))
-            if abs(mean - whole) < BESIDE_WHOLE:
-                for i in range(n - 2):
-                    flips[p, 0] += (d[i] == whole + 1) & (d[i + 1] == whole - 1)
-                    flips[p, 1] += (d[i] == whole - 1) & (d[i + 1] == whole + 1)
+            variance = _fill_moments(d[: n - 1], mean, moments[p])
+            _count_flips(d[: n - 1], mean, flips[p])
             below, above = np.int32(np.ceil(0.6 * mean - 1.0)), np.int32(np.floor(1.5 * mean + 1.0))
-            short, long = np.int64(0), np.int64(0)
+            moments[p, 2], moments[p, 3] = 0, 0
             if least < below or most > above:
-                for i in range(n - 1):
-                    too_short, too_long = d[i] < below, d[i] > above
-                    short += too_short
-                    long += too_long
-                    odd[t[i + 1]] += too_short | too_long
+                moments[p, 2], moments[p, 3] = _count_odd(t[:n], d[: n - 1], below, above, odd)
             elif n < SPARSE * frames:
                 for i in range(n - 1):
                     late[t[i + 1]] += d[i] - mean
@@ -102,13 +77,76 @@ def through_pixels(
                 late[t[0]] += mean  # no interval ends with the first spike
                 scatter[t[0]] -= variance
                 timed[t[0]] -= 1
-            moments[p, 2], moments[p, 3] = short, long
         if known:
             _add_to_spikes(words[:, column].copy(), known, means, variances, late, scatter, timed)
     lengths += counts.sum(axis=0)
     for f in range(frames):
         if timed[f] == 0:
             late[f], scatter[f] = 0.0, 0.0  # but for rounding
+
+
+@njit(cache=True, nogil=True, boundscheck=False)
+def _fill_blocks(t: NDArray[np.int32], frames: int, blocks: NDArray[np.int32]) -> None:
+    """Numbers of the spikes t (n,) in blocks (B,) of time of equal length."""
+    length = (frames + blocks.size - 1) // blocks.size
+    before = np.int64(0)
+    for b in range(blocks.size):
+        until = np.searchsorted(t, min((b + 1) * length, frames))
+        blocks[b] = until - before
+        before = until
+
+
+@njit(cache=True, nogil=True, boundscheck=False)
+def _fill_intervals(t: NDArray[np.int32], d: NDArray[np.int32]) -> tuple[np.int32, np.int32]:
+    """Intervals of the spikes t (n,) into d; returns the least and the longest."""
+    least, most = np.int32(2**31 - 1), np.int32(0)
+    for i in range(t.size - 1):
+        d[i] = t[i + 1] - t[i]
+        least, most = min(least, d[i]), max(most, d[i])
+    return least, most
+
+
+@njit(cache=True, nogil=True, boundscheck=False)
+def _fill_moments(d: NDArray[np.int32], mean: float, moments: NDArray[np.float64]) -> float:
+    """Variance of intervals d, which is returned too, and covariance of neighbouring ones, by whole sums.
+
+    sum (d - m)(d' - m) = sum d d' - m (sum d + sum d') + (n - 1) m^2        n: intervals
+    """
+    squares, products, total = np.int64(0), np.int64(0), np.int64(0)
+    for i in range(d.size):
+        squares += np.int64(d[i]) * d[i]
+        total += d[i]
+    for i in range(d.size - 1):
+        products += np.int64(d[i]) * d[i + 1]
+    variance = squares / d.size - mean * mean
+    inner = 2.0 * total - d[0] - d[d.size - 1]
+    moments[0], moments[1] = variance, (products - mean * inner) / (d.size - 1) + mean * mean
+    return variance  # type: ignore[no-any-return]
+
+
+@njit(cache=True, nogil=True, boundscheck=False)
+def _count_flips(d: NDArray[np.int32], mean: float, flips: NDArray[np.int32]) -> None:
+    """Count late spikes with the next one on time, and early ones, where the mean interval is nearly whole."""
+    whole = np.int32(np.round(mean))
+    if abs(mean - whole) < BESIDE_WHOLE:
+        for i in range(d.size - 1):
+            flips[0] += (d[i] == whole + 1) & (d[i + 1] == whole - 1)
+            flips[1] += (d[i] == whole - 1) & (d[i + 1] == whole + 1)
+
+
+@njit(cache=True, nogil=True, boundscheck=False)
+def _count_odd(
+    t: NDArray[np.int32], d: NDArray[np.int32], below: np.int32, above: np.int32, odd: NDArray[np.int32]
+) -> tuple[np.int64, np.int64]:
+    """(number of intervals d shorter than `below`, of those longer than `above`); both into `odd` (F,) where they
+    end."""
+    short, long = np.int64(0), np.int64(0)
+    for i in range(d.size):
+        too_short, too_long = d[i] < below, d[i] > above
+        short += too_short
+        long += too_long
+        odd[t[i + 1]] += too_short | too_long
+    return short, long
 
 
 @njit(cache=True, nogil=True, boundscheck=False)
