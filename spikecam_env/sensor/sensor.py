@@ -131,7 +131,9 @@ class SpikeSensor:
             InputError: for a wrong shape, NaN, infinity, negative light, frames < 1, and, unless allowed, light that
                 bends within a frame; the camera is then as it was.
         """
-        return step_together([self], [radiance], frames, outs=[out], threads=self.threads)[0]
+        given = self._step_arguments(radiance, frames, out)
+        self._expose(given)
+        return self._finish(given)
 
     def state(self) -> SensorState:
         """A copy of everything that the next step depends on, besides the model."""
@@ -212,6 +214,10 @@ class SpikeSensor:
     def _expose(self, given: _StepArguments) -> None:
         """Expose this camera by itself."""
         light, spikes = given.light, given.spikes
+        if given.together:
+            for stretch in given.stretches():
+                fast.run_together([stretch], threads=self.threads)
+            return
         images = map(self._imaging.segment_image, segments(light, self.frame, len(spikes), self._wants_courses))
         if self.engine == "fast" and self._frame_effects:
             block.run(self._first_exposure(), self._frame_effects, self._pixels, images, spikes, threads=self.threads)
