@@ -18,6 +18,7 @@ import numpy as np
 
 from scenes import VideoScene
 from scenes.film import FilmOptions, read_film
+from scenes.film.transfer import curve
 from spikecam_env.checked import checked_number
 from spikecam_env.datasets.spikezoo import RATE, WHITES
 from spikecam_env.errors import InputError
@@ -55,6 +56,8 @@ class FilmFolder:
 
     def __post_init__(self) -> None:
         checked_number(self.white, "white", *WHITES, unit="spikes/frame")
+        if self.transfer is not None:
+            curve(self.transfer)
 
     def names(self) -> list[str]:
         """The films, by their names in the folder.

@@ -185,7 +185,7 @@ def film_cuts(films: FilmFolder, *, cuts: int = 1, split: str = "test", seed: in
         settings: fields of `Plan`.
 
     Raises:
-        InputError: as `FilmFolder.names`; an unknown split.
+        InputError: as `FilmFolder.names`, and as `FilmFolder.cut` of the first film; an unknown split.
 
     Example:
         >>> Path("films").mkdir()
@@ -201,7 +201,9 @@ def film_cuts(films: FilmFolder, *, cuts: int = 1, split: str = "test", seed: in
         for name in films.names()
         for number in range(checked_count(cuts, "cuts", MOST_SCENES))
     )
-    return Plan("films", entries, seed=seed, films=films, **settings)
+    plan = Plan("films", entries, seed=seed, films=films, **settings)
+    plan.scene(entries[0])  # options that no film can have are refused before anything is written
+    return plan
 
 
 def _seeds(seed: int, purpose: str, number: int) -> tuple[int, int]:

@@ -221,6 +221,20 @@ COMMAND_LINES: dict[str, tuple[tuple[Any, ...], dict[str, tuple[Any, ...]]]] = {
         ("dataset", "phm-n", "--out", "{out}", *SIZE_8, "--frames", 2),
         {"--seed": SEEDS, "--scenes": ("", "balls", "\x00")},
     ),
+    "dataset films": (
+        ("dataset", "films", "{films}", "--out", "{out}", *SIZE_8, "--frames", 2),
+        {
+            "--seed": SEEDS,
+            "--frames": (*COUNTS, 10**15, 10**4),
+            "--size": (*SIZES, (8, 41)),
+            "--truth-every": (-1, 10**30),
+            "--cuts": (*COUNTS, 10**6),
+            "--film-rate": (*FLOATS, "1e300", "None"),
+            "--transfer": ("", "srg", "PQ", "gamma0"),
+            "--white": (*FLOATS, "11"),
+            "--jobs": WORKERS,
+        },
+    ),
     "dataset verify": (("dataset", "verify", "{here}"), {"--jobs": WORKERS}),
     "denoise": (
         ("denoise", "{here}/a.dat", "--out", "{out}", "--height", 8, "--width", 8),
@@ -352,7 +366,7 @@ COMMAND_LINES: dict[str, tuple[tuple[Any, ...], dict[str, tuple[Any, ...]]]] = {
     ),
     "evaluate spikezoo": (
         ("evaluate", "spikezoo", "{here}", "--out", "{out}"),
-        {"--rate": FLOATS, "--best": ("{here}/a.dat",)},
+        {"--rate": FLOATS, "--best": ("{here}/a.dat",), "--jobs": WORKERS},
     ),
     "evaluate tasks": (
         ("evaluate", "tasks", "--json", "{out}.json", "--tasks", "Catch-v1", "--episodes", 1),
@@ -409,7 +423,9 @@ def test_an_option_out_of_range_is_refused_by_name(name: str, tmp_path: Path, me
     """Of a command every option in turn, with every value of the table; values that are not refused are named."""
     (tmp_path / "a.dat").write_bytes(bytes(range(256)) * 2)
     np.save(tmp_path / "film.npy", np.full((5, 8, 8), 100, np.uint8))
-    places = {"here": tmp_path, "out": tmp_path / "out"}
+    (tmp_path / "films").mkdir()
+    np.save(tmp_path / "films" / "film.npy", np.full((5, 8, 8), 100, np.uint8))
+    places = {"here": tmp_path, "out": tmp_path / "out", "films": tmp_path / "films"}
 
     def refused(words: list[Any]) -> None:
         assert meets(f"options of {name}", *(_filled(word, places) for word in words)) == 2
