@@ -133,8 +133,9 @@ class Films(DatasetOptions):
     """Pictures a second; 2000 are 20 spike frames a picture.  None: by the films' time stamps."""
     transfer: str | None = "linear"
     """From values to light: linear, srgb, bt709, gamma2.2 (or another power); None: that of the files."""
-    interpolation: Literal["linear", "hold"] = "linear"
-    """Light between two pictures: a straight line, or the earlier picture held until the next."""
+    interpolation: Literal["motion", "linear", "hold"] = "motion"
+    """Light between two pictures: carried along the motion found between them, a straight line, or the earlier picture
+    held until the next."""
     white: Positive = 0.6
     """Light of the films' full scale [spikes/frame]; 0.6 in Spike-Zoo's REDS clips."""
 

@@ -34,6 +34,7 @@ class FilmFolder:
     """A folder of films, and how light is made of them.
 
     Example:
+        >>> from pathlib import Path
         >>> Path("films").mkdir()
         >>> np.save("films/wave.npy", np.random.default_rng(0).random((4, 20, 30)))
         >>> films = FilmFolder(Path("films"))
@@ -49,7 +50,7 @@ class FilmFolder:
     """Pictures a second; None: by the films' time stamps."""
     transfer: str | None = "linear"
     """From values to light, as `VideoScene` has it; None: that of the files."""
-    interpolation: Literal["linear", "hold"] = "linear"
+    interpolation: Literal["motion", "linear", "hold"] = "motion"
     """Light between two pictures, as `VideoScene` has it."""
     white: float = RATE
     """Light of the films' full scale [spikes/frame]."""

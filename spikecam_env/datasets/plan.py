@@ -188,6 +188,7 @@ def film_cuts(films: FilmFolder, *, cuts: int = 1, split: str = "test", seed: in
         InputError: as `FilmFolder.names`, and as `FilmFolder.cut` of the first film; an unknown split.
 
     Example:
+        >>> from pathlib import Path
         >>> Path("films").mkdir()
         >>> np.save("films/wave.npy", np.random.default_rng(0).random((4, 20, 30)))
         >>> [entry.path for entry in film_cuts(FilmFolder(Path("films")), cuts=2, shape=(8, 16), frames=60).entries]
