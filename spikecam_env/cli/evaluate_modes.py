@@ -68,7 +68,8 @@ class SpikeZoo:
 
         options: dict[str, Any] = {"weights": self.weights.by_mode(), "rate": self.rate, "jobs": self.jobs}
         options["pictures"] = self.pictures
-        _show("spikezoo", self.out, report(evaluate_spikezoo(self.folder, self.modes, out=self.out, **options)))
+        result = evaluate_spikezoo(self.folder, self.modes, out=self.out, **options)
+        _show("spikezoo", self.out, report(result), "png", "csv")
 
 
 @dataclass
@@ -102,7 +103,7 @@ class TruthTests:
         _show("truth", self.out, report(evaluate_truth(self.static, self.moving, self.modes, out=self.out, **options)))
 
 
-def _show(name: str, out: Path | None, report: str) -> None:
+def _show(name: str, out: Path | None, report: str, *more: str) -> None:
     print(report, end="")
     if out is not None:
-        print(f"wrote {name}.json and {name}.txt in {out}")
+        print(f"wrote {', '.join(f'{name}.{kind}' for kind in (*more, 'json'))} and {name}.txt in {out}")

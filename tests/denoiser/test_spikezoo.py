@@ -27,6 +27,14 @@ def test_an_offset_of_a_tenth_is_20_db():
     assert same["PSNR"] > 150 and same["SSIM"] == pytest.approx(1) and same["SSIM [0, 1]"] == pytest.approx(1)
 
 
+def test_errors_in_fine_detail_are_left_out_of_the_coarse_psnr():
+    truth = np.full((40, 40), 0.5)
+    checks = 0.1 * (-1.0) ** np.add.outer(np.arange(40), np.arange(40))
+    found = score(0.6 * (truth + checks), truth)
+    assert found["PSNR"] == pytest.approx(20.0) and found["coarse PSNR"] > 60
+    assert score(0.6 * (truth + 0.1), truth)["coarse PSNR"] == pytest.approx(20.0)
+
+
 def test_a_picture_is_cut_at_black_and_white():
     truth = np.linspace(0, 1, 400).reshape(20, 20)
     wild = 0.6 * np.where(truth > 0.5, 1.5, -0.5)
