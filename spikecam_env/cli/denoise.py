@@ -10,7 +10,7 @@ import tyro
 
 from spikecam_env.cli.mode_weights import Mode
 from spikecam_env.cli.reading import ReadingOptions
-from spikecam_env.numbers import Count
+from spikecam_env.numbers import Count, Whole
 
 if TYPE_CHECKING:
     import numpy as np
@@ -45,6 +45,10 @@ class Denoise:
     """Not for `paper`: passes that overlap by half: less error, no seams, twice the time."""
     calibration: Path | None = None
     """Not for `paper`: maps.h5 of `spikecam calibrate`, or its folder: the camera's fixed pattern is then taken out."""
+    first: Whole = 0
+    """First frame of the recording to denoise."""
+    count: Count | None = None
+    """Frames to denoise; default: all from there on."""
     film: bool = True
     """Also write film.mp4, noisy beside denoised: at most 240 pictures, evenly over the recording."""
     reading: ReadingOptions = field(default_factory=ReadingOptions)
@@ -54,14 +58,16 @@ class Denoise:
         from spikecam_env.cli.table import table
         from spikecam_env.streams import read_recording
 
-        recording = read_recording(self.file, **self.reading.options())
+        part: dict[str, Any] = {"first": self.first, "count": self.count}
+        recording = read_recording(self.file, **part, **self.reading.options())
         print(f"{self.file}: {recording}")
         with out_folder(self.out) as folder:
             found = self._restored(recording)
             self._write_stream(folder, recording, found)
             self._write_pictures(folder, found)
             rows, speed = found.rows(), found.speed()
-            summary = {"file": str(self.file), "mode": self.mode, "window": found.window, "speed": speed, "rows": rows}
+            summary = {"file": str(self.file), "first": self.first, "mode": self.mode, "window": found.window}
+            summary |= {"speed": speed, "rows": rows}
             write_json(folder / "summary.json", summary)
             written = sorted(path.name for path in folder.iterdir())
         print(table(rows))
@@ -82,19 +88,27 @@ class Denoise:
 
         noisy = recording.spikes
         window = checked_window(self.window, len(noisy))
-        light = light_at(self.file, whole_windows(len(noisy), window), noisy.shape[1:])
+        light = light_at(self.file, whole_windows(len(noisy), window), noisy.shape[1:], self.first)
         options: dict[str, Any] = {"overlap": self.overlap, "unit": self.calibration, "engine": self.engine}
         online = OnlineDnSS.pretrained(self.mode, output="both", **options)
         denoised, planes, seconds = restore(noisy, online, [*picture_frames(len(noisy), window), *light])
         return DenoisedRecording(
-            noisy, denoised, planes, light, window, recording.frame_rate_hz, seconds, online.latency
+            noisy,
+            denoised,
+            planes,
+            light,
+            window,
+            recording.frame_rate_hz,
+            seconds,
+            online.latency,
+            first=self.first,
         )
 
     def _write_stream(self, folder: Path, recording: Recording, found: DenoisedRecording) -> None:
         from spikecam_env.streams import SpikeWriter
 
         attributes = {k: v for k, v in recording.attributes.items() if k in ("model", "seed", "scene")}
-        attributes |= {"denoiser": self.mode, "source": self.file.name}
+        attributes |= {"denoiser": self.mode, "source": self.file.name, "first": self.first}
         shape = found.denoised.shape[1:]
         with SpikeWriter(folder / "denoised.h5", shape, recording.frame_rate_hz, **attributes) as writer:
             writer.append(found.denoised)
@@ -107,7 +121,8 @@ class Denoise:
         white, rate_hz = found.white, found.frame_rate_hz
 
         def picture(frame: int, *, light: bool) -> NDArray[np.uint8]:
-            return compose(found.panels(frame, light=light), white, corner=f"{self.mode}: {instant(frame, rate_hz)}")
+            when = instant(self.first + frame, rate_hz)
+            return compose(found.panels(frame, light=light), white, corner=f"{self.mode}: {when}")
 
         write_picture(folder / "pictures.png", picture(found.middle, light=True))
         if self.film:
