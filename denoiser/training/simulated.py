@@ -180,6 +180,9 @@ class SimulatedStreams:
         InputError: the patch is larger than the bank's units.
     """
 
+    units_known = True
+    """`unit` gives them."""
+
     def __init__(
         self,
         count: int = 128,
