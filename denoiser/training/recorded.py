@@ -60,8 +60,8 @@ class RecordedStreams:
         InputError: a recording is smaller than a stream, or its part shorter than the shortest one.
     """
 
-    units_known = False
-    """Nobody knows a recording's fixed pattern."""
+    simulated = False
+    """The clean twin stands for the light, and the fixed pattern of the unit is unknown."""
 
     def __init__(
         self,

@@ -135,7 +135,7 @@ class Rollouts(StreamSource):
             interval, mean = planes[:, : self.layout.planes], planes[:, self.layout.means[0], None]
             bare = valid * (1 - mapped)
             found = {"network": (rate, bare)}
-            if self.streams.units_known:
+            if self.streams.simulated:
                 found["mapped"] = rate, valid * mapped
             found |= {"interval": (interval, bare), "mean": (mean, bare)}
             yield light, {name: (guess.clamp(0, 1), weight) for name, (guess, weight) in found.items()}
@@ -172,7 +172,7 @@ class Rollouts(StreamSource):
 
     def _calibrated(self, windows: StreamWindows, begins: Tensor, rows: Tensor) -> None:
         """Give the streams that begin a map, or none; in place.  Streams of recordings never have one."""
-        if not self.streams.units_known:
+        if not self.streams.simulated:
             return
         gain, dark = self.streams.unit(rows)
         low, high = map(math.log, MAP_ERRORS)

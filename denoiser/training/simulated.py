@@ -180,8 +180,8 @@ class SimulatedStreams:
         InputError: the patch is larger than the bank's units.
     """
 
-    units_known = True
-    """`unit` gives them."""
+    simulated = True
+    """Light and units are known."""
 
     def __init__(
         self,

@@ -36,6 +36,8 @@ class Denoise:
     """Folder for denoised.h5, pictures.png, film.mp4 and summary.json."""
     mode: Mode = "best"
     """Which DnSS: `best`, `fast` (a quarter of its weights), or `paper` (the paper's network; slower)."""
+    weights: Path | None = None
+    """Weights of your own (`spikecam train`), in place of the mode's."""
     engine: Literal["torch"] = "torch"
     """The library that computes the network; there is one."""
     window: Count | None = None
@@ -66,7 +68,7 @@ class Denoise:
             self._write_stream(folder, recording, found)
             self._write_pictures(folder, found)
             rows, speed = found.rows(), found.speed()
-            summary = {"file": str(self.file), "first": self.first, "mode": self.mode, "window": found.window}
+            summary = {"file": str(self.file), "first": self.first, "mode": self._name, "window": found.window}
             summary |= {"speed": speed, "rows": rows}
             write_json(folder / "summary.json", summary)
             written = sorted(path.name for path in folder.iterdir())
@@ -74,6 +76,11 @@ class Denoise:
         print()
         print(table([speed]))
         print(f"wrote {', '.join(written)} in {self.out}")
+
+    @property
+    def _name(self) -> str:
+        """Of the denoiser."""
+        return self.mode if self.weights is None else self.weights.name
 
     def _restored(self, recording: Recording) -> DenoisedRecording:
         from denoiser import OnlineDnSS
@@ -90,7 +97,10 @@ class Denoise:
         window = checked_window(self.window, len(noisy))
         light = light_at(self.file, whole_windows(len(noisy), window), noisy.shape[1:], self.first)
         options: dict[str, Any] = {"overlap": self.overlap, "unit": self.calibration, "engine": self.engine}
-        online = OnlineDnSS.pretrained(self.mode, output="both", **options)
+        if self.weights is None:
+            online = OnlineDnSS.pretrained(self.mode, output="both", **options)
+        else:
+            online = OnlineDnSS.from_file(self.weights, output="both", **options)
         denoised, planes, seconds = restore(noisy, online, [*picture_frames(len(noisy), window), *light])
         return DenoisedRecording(
             noisy,
@@ -108,7 +118,7 @@ class Denoise:
         from spikecam_env.streams import SpikeWriter
 
         attributes = {k: v for k, v in recording.attributes.items() if k in ("model", "seed", "scene")}
-        attributes |= {"denoiser": self.mode, "source": self.file.name, "first": self.first}
+        attributes |= {"denoiser": self._name, "source": self.file.name, "first": self.first}
         shape = found.denoised.shape[1:]
         with SpikeWriter(folder / "denoised.h5", shape, recording.frame_rate_hz, **attributes) as writer:
             writer.append(found.denoised)
@@ -122,7 +132,7 @@ class Denoise:
 
         def picture(frame: int, *, light: bool) -> NDArray[np.uint8]:
             when = instant(self.first + frame, rate_hz)
-            return compose(found.panels(frame, light=light), white, corner=f"{self.mode}: {when}")
+            return compose(found.panels(frame, light=light), white, corner=f"{self._name}: {when}")
 
         write_picture(folder / "pictures.png", picture(found.middle, light=True))
         if self.film:

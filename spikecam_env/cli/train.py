@@ -11,8 +11,8 @@ from spikecam_env.numbers import Count, Positive, Range, Seed, WholeRange, Worke
 
 @dataclass
 class Train:
-    """Train DnSS or a reconstructor on noisy and clean streams simulated on the fly, or on recordings with a clean twin;
-    goes on from its last checkpoint.
+    """Train DnSS or a reconstructor on noisy and clean streams simulated on the fly, or on recordings; goes on from its
+    last checkpoint.
 
     example:  spikecam train --mode best --out runs/best
     on films: spikecam train --start best --recordings clip.h5 --out runs/mine
