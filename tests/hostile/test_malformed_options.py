@@ -83,8 +83,13 @@ COMMAND_LINES: dict[str, tuple[tuple[Any, ...], dict[str, tuple[Any, ...]]]] = {
             "--mean-interval": (*EVERY_FLOAT, *ENDS, "0.5"),
             "--transfer": ("", "log", "gamma0", "gammanan", "gamma1e308"),
             "--truth-every": (-1, 10**16, 10**30),
+            "--interpolation": ("", "fade", "none", "Motion"),
             "--out": ("{here}/x", "{here}/x.avi", "{here}/none/x.h5"),
         },
+    ),
+    "film clean": (
+        ("film", "{here}/film.npy", "--clean", "--film-rate", 1000, "--transfer", "linear", *SIZE_8),
+        {"--out": ("{here}/x", "{here}/x.npz", "{here}/x.dat", "{here}/none/x.h5")},
     ),
     "demo": (
         ("demo", "--out", "{out}", *SIZE_8),
@@ -243,6 +248,9 @@ COMMAND_LINES: dict[str, tuple[tuple[Any, ...], dict[str, tuple[Any, ...]]]] = {
             "--height": COUNTS,
             "--width": (*COUNTS, 10**9),
             "--crop-width": (*COUNTS, 9),
+            "--first": (-1, 100, 10**30),
+            "--count": (*COUNTS, 10**9),
+            "--weights": ("{here}/none.pt", "{here}/a.dat", "", "\x00"),
         },
     ),
     "live": (
@@ -307,6 +315,7 @@ COMMAND_LINES: dict[str, tuple[tuple[Any, ...], dict[str, tuple[Any, ...]]]] = {
             "--channels": ((0, 0, 0), (257, 1, 1)),
             "--width": (12,),
             "--frames-a-step": (12,),
+            "--recordings": ("{here}/none.h5", "{here}/a.dat", "{here}", "", "\x00"),
             "--no-refine": ((),),
         },
     ),
@@ -402,6 +411,8 @@ COMMAND_LINES: dict[str, tuple[tuple[Any, ...], dict[str, tuple[Any, ...]]]] = {
         {
             "--frames": (*COUNTS, 300),
             "--clips": COUNTS,
+            "--first": (-1, 10**30),
+            "--count": COUNTS,
             "--rate": FLOATS,
             "--out": ("{here}/none/x", "{here}/a.dat"),
         },
