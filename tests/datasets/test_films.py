@@ -38,7 +38,8 @@ def films(tmp_path: Path) -> Path:
 
 
 def test_light_is_white_times_the_value_of_a_part_of_the_picture(films: Path, tmp_path: Path) -> None:
-    assert dataset(films, "--out", tmp_path / "out", *CUTS, "--model", "ideal") == 0
+    options = (*CUTS, "--model", "ideal", "--interpolation", "linear")
+    assert dataset(films, "--out", tmp_path / "out", *options) == 0
     truth = read_truth(tmp_path / "out" / "test" / "street-0.h5")
     assert list(truth["frame"]) == [0.5, 20.5, 40.5, 60.5]
     for frame, light in zip(truth["frame"], truth["radiance"], strict=True):
