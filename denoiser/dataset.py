@@ -1,4 +1,4 @@
-"""A torch `Dataset` over a folder of recordings: windows of noisy spikes, with the clean twin's normalised ISI plane.
+"""A torch `Dataset` over recordings: windows of noisy spikes, with the clean twin's normalised ISI plane.
 
 The target is the paper's, (22): 1 / ISI of the noise-free stream at the window's middle frame.  Windows start after
 noisy and clean twins have forgotten their common phase, 64 frames after the start.
@@ -6,6 +6,7 @@ noisy and clean twins have forgotten their common phase, 64 frames after the sta
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, TypedDict
 
@@ -16,15 +17,14 @@ from torch.utils.data import Dataset
 
 from denoiser.training.pairs import WARM_UP
 from spikecam_env.checked import checked_seed, checked_shape, checked_whole
-from spikecam_env.datasets import read_window
-from spikecam_env.datasets.manifest import Manifest
+from spikecam_env.datasets import TwinRecording, read_window, twin_recordings
 from spikecam_env.errors import InputError
 
 __all__ = ["SpikeWindows"]
 
 
 class Item(TypedDict):
-    """A window of one scene."""
+    """A window of one recording."""
 
     spikes: Tensor
     """(2 reach + 1, h, w) uint8, noisy."""
@@ -41,20 +41,20 @@ class Item(TypedDict):
 
 
 class SpikeWindows(Dataset[Item]):
-    """Windows at every `stride`-th frame of every scene of a split, each with one random crop, for a torch
-    `DataLoader`.
+    """Windows at every `stride`-th frame of recordings, each with one random crop, for a torch `DataLoader`.
 
     Args:
-        folder: of a finished dataset (`spikecam dataset`).
-        split: "train" or "test".
+        source: a folder of a finished dataset (`spikecam dataset`); or one or several .h5 recordings with a clean twin
+            (`spikecam film --clean`), of any size and length.
+        split: of a dataset, "train" or "test".
         reach: frames before and after the middle one; 20 is the paper's window of 41.
-        crop: (rows, columns); None: the whole picture.
+        crop: (rows, columns); None: the whole picture, of recordings of one size.
         stride: frames between windows.
         seed: of the crops; item i of an epoch is always the same.  Set `epoch` before each pass to draw others.
 
     Raises:
-        InputError: the folder is no dataset or not finished, has no such split, or its scenes are too small for a
-            window or a crop.
+        InputError: a folder is no dataset or not finished, or has no such split; a file is no recording with a clean
+            twin; a recording is too small for a crop, or too short for a window.
 
     Example:
         >>> from spikecam_env.datasets import Plan, PlannedScene, build
@@ -63,11 +63,13 @@ class SpikeWindows(Dataset[Item]):
         >>> item = SpikeWindows("windows", crop=(8, 8))[0]
         >>> item["spikes"].shape, item["clean_isi"].shape
         (torch.Size([41, 8, 8]), torch.Size([8, 8]))
+        >>> len(SpikeWindows(["windows/train/disk.h5"], crop=(8, 8)))
+        56
     """
 
     def __init__(
         self,
-        folder: str | Path,
+        source: str | Path | Sequence[str | Path],
         split: str = "train",
         *,
         reach: int = 20,
@@ -75,27 +77,27 @@ class SpikeWindows(Dataset[Item]):
         stride: int = 1,
         seed: int = 0,
     ) -> None:
-        manifest = Manifest.read(Path(folder))
-        files = [file for file in manifest.files if file["path"].startswith(f"{split}/")]
-        if not files:
-            splits = {file["path"].split("/")[0] for file in manifest.files}
-            raise InputError(f"{folder} has no scenes of split {split!r}; it has {', '.join(sorted(splits))}")
-        if any(file["sha256"] is None for file in files):
-            raise InputError(f"{folder} is not finished; run its `spikecam dataset` command again")
+        recordings = twin_recordings(source, split)
         stride = checked_whole(stride, "stride", 1)
-        rows, columns = manifest.settings["shape"]
-        self.paths = [Path(folder) / file["path"] for file in files]
-        self.shape = (int(rows), int(columns))
-        self.crop = self.shape if crop is None else checked_shape(crop)
-        if not all(n <= full for n, full in zip(self.crop, self.shape, strict=True)):
-            raise InputError(f"crop {self.crop}; it must be at most {self.shape}")
+        self.paths = [recording.path for recording in recordings]
+        self.shapes = [recording.shape for recording in recordings]
+        if crop is None and len(set(self.shapes)) > 1:
+            raise InputError(f"crop is None for recordings of several sizes, {set(self.shapes)}; give (rows, columns)")
+        self.crop = self.shapes[0] if crop is None else checked_shape(crop)
         self.reach, self.seed = checked_whole(reach, "reach", 0), checked_seed(seed)
         self._epoch = torch.zeros(1, dtype=torch.int64).share_memory_()
-        self.frames = range(WARM_UP + reach, int(manifest.settings["frames"]) - reach, stride)
-        if not self.frames:
+        self.frames = [range(WARM_UP + reach, recording.frames - reach, stride) for recording in recordings]
+        for recording, frames in zip(recordings, self.frames, strict=True):
+            self._check(recording, frames)
+        self._ends = np.cumsum([len(frames) for frames in self.frames])
+
+    def _check(self, recording: TwinRecording, frames: range) -> None:
+        if not all(n <= full for n, full in zip(self.crop, recording.shape, strict=True)):
+            raise InputError(f"{recording.path}: crop {self.crop}; it must be at most {recording.shape}")
+        if not frames:
             raise InputError(
-                f"scenes of {manifest.settings['frames']} frames hold no window of {2 * reach + 1} "
-                f"after the first {WARM_UP}; make longer ones"
+                f"{recording.path}: {recording.frames} frames hold no window of {2 * self.reach + 1} after the first "
+                f"{WARM_UP}; make longer ones"
             )
 
     @property
@@ -114,15 +116,15 @@ class SpikeWindows(Dataset[Item]):
             self._epoch.share_memory_()
 
     def __len__(self) -> int:
-        return len(self.paths) * len(self.frames)
+        return int(self._ends[-1])
 
     def __getitem__(self, index: int) -> Item:
         if not 0 <= index < len(self):
             raise IndexError(f"item {index} of {len(self)}")
-        scene, window = divmod(index, len(self.frames))
+        scene = int(np.searchsorted(self._ends, index, "right"))
         rng = np.random.default_rng([self.seed, self.epoch, index])
-        row, column = (int(rng.integers(full - n + 1)) for n, full in zip(self.crop, self.shape, strict=True))
-        frame = self.frames[window]
+        row, column = (int(rng.integers(full - n + 1)) for n, full in zip(self.crop, self.shapes[scene], strict=True))
+        frame = self.frames[scene][index - int(self._ends[scene])]
         rows, columns = slice(row, row + self.crop[0]), slice(column, column + self.crop[1])
         found = read_window(self.paths[scene], frame, reach=self.reach, rows=rows, columns=columns)
         return {

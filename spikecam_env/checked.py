@@ -159,7 +159,7 @@ def checked_memory(size: int, what: str) -> None:
         return
     most = memory_bytes()
     if size > most:
-        raise InputError(f"{what} would take {_amount(size)} of memory, this machine has {_amount(most)}; ask less")
+        raise InputError(f"{what} would take {amount(size)} of memory, this machine has {amount(most)}; ask less")
 
 
 def checked_disk(size: int, path: str | Path, what: str) -> None:
@@ -173,7 +173,7 @@ def checked_disk(size: int, path: str | Path, what: str) -> None:
         place = place.parent
     free = shutil.disk_usage(place).free
     if size > free:
-        raise InputError(f"{what} would take {_amount(size)} on disk; {place} has {_amount(free)} free")
+        raise InputError(f"{what} would take {amount(size)} on disk; {place} has {amount(free)} free")
 
 
 def memory_bytes() -> int:
@@ -190,7 +190,7 @@ def memory_bytes() -> int:
     return most
 
 
-def _amount(size: float) -> str:
+def amount(size: float) -> str:
     """Bytes in the unit that fits: `38.4 kB`, `12 GB`."""
     for unit in ("bytes", "kB", "MB", "GB"):
         if size < 1000:

@@ -67,9 +67,9 @@ class RowResult(CaseRecord):
     """Where nothing moves, from step to step (`measures`)."""
 
 
-def display(radiance: Planes, white: float) -> np.ndarray:
-    """Light as a screen shows it: (H, W) in [0, 1], gamma 2.2."""
-    return np.clip(np.asarray(radiance, np.float64) / white, 0, 1) ** (1 / 2.2)
+def display(radiance: Planes, white: float, gamma: float = 2.2) -> np.ndarray:
+    """Light as a screen shows it: (H, W) in [0, 1]."""
+    return np.clip(np.asarray(radiance, np.float64) / white, 0, 1) ** (1 / gamma)
 
 
 def pictures_of(made: RowStreams, exposed: ExposedStreams, columns: Mapping[str, Path]) -> dict[str, Planes]:

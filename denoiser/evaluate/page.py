@@ -1,15 +1,16 @@
-"""The pictures of a table as files, and their page: one strip a scene, of the rows' pictures, noisy to light."""
+"""The pictures of an evaluation as files, and their page: one strip a scene, of the rows' pictures, noisy to light."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 from matplotlib import font_manager
 from PIL import Image, ImageDraw, ImageFont
 
-from denoiser.evaluate.case import ExposedStreams, Planes, StreamCase
+from denoiser.evaluate.case import Planes, StreamCase
 from denoiser.evaluate.judge import COLUMNS, PLANE, RowResult, display
 from denoiser.evaluate.rows import ROWS
 from spikecam_env.whole import whole_file
@@ -25,15 +26,28 @@ LIGHT = "light"
 STRIP = ("noisy", "paper-mus", "paper", "best", "clean")
 
 
+class Panel(NamedTuple):
+    """A picture of a strip."""
+
+    path: Path
+    title: str
+    line: str
+    """Below the title."""
+
+
+def picture_file(folder: Path, case: StreamCase, row: str, column: str) -> Path:
+    """Where the picture of a row of a case is."""
+    return folder / f"{case.scene.replace(' ', '-')}-{row}-{column}.png"
+
+
 def save_pictures(
-    folder: Path, case: StreamCase, row: str, shown: Mapping[str, Planes], exposed: ExposedStreams
+    folder: Path, case: StreamCase, row: str, shown: Mapping[str, Planes], white: float, gamma: float = 2.2
 ) -> None:
-    """Pictures of a row by column, and the true light where it is known, as PNG files."""
+    """Pictures of a row by column [spikes/frame], as PNG files.  `gamma` 1 where white is a value of a screen."""
     for column, found in shown.items():
-        _save(_file(folder, case, row, column), display(found, exposed.white))
-    if exposed.light is not None:
-        truth = exposed.light[exposed.middle - exposed.first]
-        _save(_file(folder, case, LIGHT, LIGHT), display(truth, exposed.white))
+        screen = display(found, white, gamma)
+        with whole_file(picture_file(folder, case, row, column)) as beside:
+            Image.fromarray((255 * screen + 0.5).astype(np.uint8)).save(beside)
 
 
 def write_page(
@@ -41,8 +55,18 @@ def write_page(
 ) -> None:
     """Strips of the scenes whose pictures are in `folder`; no page where there are none."""
     first = {case.scene: case for case in reversed(cases)}
-    strips = [_strip(folder, first[scene], rows, records) for scene in reversed(first)]
-    made = [strip for strip in strips if strip is not None]
+    write_strips(path, [_panels(folder, first[scene], rows, records) for scene in reversed(first)])
+
+
+def write_strips(path: Path, strips: Sequence[Sequence[Panel]], crop: tuple[int, int] | None = None) -> None:
+    """A page of strips; panels without a file are left out, and no page is written where there is none.
+
+    Args:
+        path: of the page.
+        strips: of pictures of one size each.
+        crop: rows and columns of the middle that is shown, pixel by pixel; default: all of it.
+    """
+    made = [_strip(here, crop) for strip in strips if (here := [panel for panel in strip if panel.path.is_file()])]
     if not made:
         return
     width, height = max(s.width for s in made), sum(s.height for s in made)
@@ -55,24 +79,33 @@ def write_page(
         whole.save(beside)
 
 
-def _strip(folder: Path, case: StreamCase, rows: Sequence[str], records: Sequence[RowResult]) -> Image.Image | None:
-    panels = [(row, COLUMN) for row in STRIP if row in rows]
-    panels += [(row, PLANE) for row in rows if ROWS[row].shows_planes]
-    panels.append((LIGHT, LIGHT))
-    shown = [(row, column, _file(folder, case, row, column)) for row, column in panels]
-    pictures = [(row, column, Image.open(path)) for row, column, path in shown if path.is_file()]
-    if not pictures:
-        return None
-    w, h = WIDE, round(WIDE / pictures[0][2].width * pictures[0][2].height)
+def _panels(folder: Path, case: StreamCase, rows: Sequence[str], records: Sequence[RowResult]) -> list[Panel]:
+    shown = [(row, COLUMN) for row in STRIP if row in rows]
+    shown += [(row, PLANE) for row in rows if ROWS[row].shows_planes]
+    shown.append((LIGHT, LIGHT))
+    return [Panel(picture_file(folder, case, *panel), *_caption(case, *panel, records)) for panel in shown]
+
+
+def _strip(panels: Sequence[Panel], crop: tuple[int, int] | None) -> Image.Image:
+    pictures = [_cropped(Image.open(panel.path), crop) for panel in panels]
+    w, h = WIDE, round(WIDE / pictures[0].width * pictures[0].height)
+    way = Image.Resampling.LANCZOS if crop is None else Image.Resampling.NEAREST
     strip = Image.new("RGB", (len(pictures) * (w + MARGIN) + MARGIN, h + MARGIN + CAPTION), BACKGROUND)
     draw = ImageDraw.Draw(strip)
-    for i, (row, column, picture) in enumerate(pictures):
+    for i, (panel, picture) in enumerate(zip(panels, pictures, strict=True)):
         x = MARGIN + i * (w + MARGIN)
-        strip.paste(picture.resize((w, h), Image.Resampling.LANCZOS).convert("RGB"), (x, MARGIN))
-        title, line = _caption(case, row, column, records)
-        draw.text((x, MARGIN + h + 3), title, INK, _font(12))
-        draw.text((x, MARGIN + h + 18), line, FAINT, _font(11))
+        strip.paste(picture.resize((w, h), way).convert("RGB"), (x, MARGIN))
+        draw.text((x, MARGIN + h + 3), panel.title, INK, _font(12))
+        draw.text((x, MARGIN + h + 18), panel.line, FAINT, _font(11))
     return strip
+
+
+def _cropped(picture: Image.Image, crop: tuple[int, int] | None) -> Image.Image:
+    if crop is None:
+        return picture
+    high, wide = min(crop[0], picture.height), min(crop[1], picture.width)
+    left, top = (picture.width - wide) // 2, (picture.height - high) // 2
+    return picture.crop((left, top, left + wide, top + high))
 
 
 def _caption(case: StreamCase, row: str, column: str, records: Sequence[RowResult]) -> tuple[str, str]:
@@ -89,12 +122,3 @@ def _caption(case: StreamCase, row: str, column: str, records: Sequence[RowResul
 
 def _font(size: int) -> ImageFont.FreeTypeFont:
     return ImageFont.truetype(font_manager.findfont("DejaVu Sans"), size)
-
-
-def _file(folder: Path, case: StreamCase, row: str, column: str) -> Path:
-    return folder / f"{case.scene.replace(' ', '-')}-{row}-{column}.png"
-
-
-def _save(path: Path, shown: np.ndarray) -> None:
-    with whole_file(path) as beside:
-        Image.fromarray((255 * shown + 0.5).astype(np.uint8)).save(beside)

@@ -55,6 +55,8 @@ def dataset_cases(folder: str | Path) -> list[StreamCase]:
     manifest = Manifest.read(Path(folder)).without_lost(Path(folder))
     settings = manifest.settings
     rows, columns = settings["shape"]
+    if settings.get("mean_interval") is None:
+        raise InputError(f"{folder} holds cuts of films; give a dataset of `spikecam dataset phm-n`")
     for file in manifest.files:
         if file["sha256"] is None:
             raise InputError(f"{folder} has no whole {file['path']}; run `spikecam dataset` again to make it")

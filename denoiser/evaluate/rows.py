@@ -99,13 +99,13 @@ class Weights:
     files: Mapping[str, Path] = field(default_factory=dict)
 
     @classmethod
-    def of_modes(cls, modes: Sequence[str], files: WeightFiles | None) -> Weights:
-        """The files by mode; InputError for an unknown mode, and for weights of one that cannot be read."""
+    def of_modes(cls, modes: Sequence[str], files: WeightFiles | None, known: Sequence[str] = MODES) -> Weights:
+        """The files by mode; InputError for a mode that is not known, and for weights of one that cannot be read."""
         weights = cls({mode: Path(path) for mode, path in (files or {}).items()})
         weights.check()
         for mode in modes:
-            if mode not in MODES:
-                raise unknown_name("denoiser mode", mode, MODES)
+            if mode not in known:
+                raise unknown_name("denoiser mode", mode, known)
             if why := why_not(mode, weights):
                 raise InputError(why)
         return weights
@@ -206,9 +206,9 @@ def restored(online: OnlineDnSS, spikes: NDArray[np.uint8], title: str | None = 
     return Restored(fired, rates, whole)
 
 
-def denoiser(mode: str, weights: Weights) -> OnlineDnSS:
-    """The denoiser of a mode; InputError as `OnlineDnSS`."""
-    return _online(*_version(weights.path(mode)))
+def denoiser(source: str, weights: Weights) -> OnlineDnSS:
+    """The denoiser of a mode, or of `best-overlap`; InputError as `OnlineDnSS`."""
+    return _online(*_version(weights.path(weights_of(source) or source)), source == "best-overlap")
 
 
 def planes_a_pass(source: str, weights: Weights) -> int:

@@ -23,7 +23,7 @@ from typing import Any
 from denoiser.evaluate import held_out, phm, real
 from denoiser.evaluate.case import ExposedStreams, StreamCase
 from denoiser.evaluate.judge import COLUMNS, RowResult, judged, pictures_of
-from denoiser.evaluate.page import save_pictures, write_page
+from denoiser.evaluate.page import LIGHT, save_pictures, write_page
 from denoiser.evaluate.rows import ROWS, RowStreams, Weights, parameters, planes_a_pass, why_not
 from denoiser.evaluate.table_report import report
 from denoiser.evaluate.table_summary import groups
@@ -62,7 +62,10 @@ class Table:
 def _judged(item: WorkItem[RowResult], made: RowStreams, exposed: ExposedStreams) -> dict[str, Any]:
     shown = pictures_of(made, exposed, {column: item.weights.path(column) for column in item.columns})
     if item.pictures is not None:
-        save_pictures(item.pictures, item.case, made.row, shown, exposed)
+        save_pictures(item.pictures, item.case, made.row, shown, exposed.white)
+        if exposed.light is not None:
+            truth = exposed.light[exposed.middle - exposed.first]
+            save_pictures(item.pictures, item.case, LIGHT, {LIGHT: truth}, exposed.white)
     return judged(shown, made, exposed, planes_a_pass(item.source, item.weights), still=item.kind == STILL)
 
 

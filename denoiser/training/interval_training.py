@@ -73,7 +73,9 @@ class IntervalWindows(StreamSource):
     def guesses(self, network: nn.Module, passes: int) -> Iterator[Guesses]:
         """Of the network, the noisy and the clean interval."""
         for predicted, target, light, noisy, valid in self._windows(network, passes):
-            found = {"network": predicted, "interval": noisy, "clean interval": target}
+            found = {"network": predicted, "interval": noisy}
+            if self.streams.simulated:
+                found["clean interval"] = target
             yield light, {name: (guess, valid) for name, guess in found.items()}
 
     def _windows(self, network: nn.Module, passes: int) -> Iterator[Taught]:

@@ -22,6 +22,7 @@ from denoiser.ground.number_type import computing_in
 from denoiser.networks import ssml
 from denoiser.networks.reconstructor_recipe import ReconstructorRecipe
 from denoiser.networks.spk2imgnet import CENTRES, WINDOW
+from denoiser.training.recorded import RecordedStreams
 from denoiser.training.simulated import UNIT_SHAPE, SimulatedStreams
 from denoiser.training.training_source import Guesses, HeldOut, StreamSource
 
@@ -54,7 +55,7 @@ class LessonWindows(NamedTuple):
 class RollingWindows:
     """Windows of `span` frames of every stream, of clean or noisy spikes, changed in place (`captured.py`)."""
 
-    def __init__(self, streams: SimulatedStreams, spikes: str, span: int) -> None:
+    def __init__(self, streams: SimulatedStreams | RecordedStreams, spikes: str, span: int) -> None:
         self.streams, self._kind = streams, spikes
         shape, device = (streams.count, span, streams.patch, streams.patch), streams.device
         self._spikes = torch.zeros(shape, dtype=torch.uint8, device=device)
@@ -79,7 +80,7 @@ class Lesson(StreamSource):
         streams: as for `StreamSource`.
     """
 
-    options: ClassVar = {"batch": 64, "validate_every": 500, "width": None, "frames_a_step": 12}
+    options: ClassVar = {"batch": 64, "validate_every": 500, "width": None, "frames_a_step": 12, "recordings": ()}
     sides = range(1, min(UNIT_SHAPE) + 1)
     held_out = HeldOut(streams=64, passes=4)
     whole_bank = True

@@ -134,7 +134,9 @@ class Rollouts(StreamSource):
         for rate, light, _, planes, valid, mapped in self._passes(network, passes):
             interval, mean = planes[:, : self.layout.planes], planes[:, self.layout.means[0], None]
             bare = valid * (1 - mapped)
-            found = {"network": (rate, bare), "mapped": (rate, valid * mapped)}
+            found = {"network": (rate, bare)}
+            if self.streams.simulated:
+                found["mapped"] = rate, valid * mapped
             found |= {"interval": (interval, bare), "mean": (mean, bare)}
             yield light, {name: (guess.clamp(0, 1), weight) for name, (guess, weight) in found.items()}
 
@@ -169,7 +171,9 @@ class Rollouts(StreamSource):
             getattr(self._past, name)[rows] = value.detach()
 
     def _calibrated(self, windows: StreamWindows, begins: Tensor, rows: Tensor) -> None:
-        """Give the streams that begin a map, or none; in place."""
+        """Give the streams that begin a map, or none; in place.  Streams of recordings never have one."""
+        if not self.streams.simulated:
+            return
         gain, dark = self.streams.unit(rows)
         low, high = map(math.log, MAP_ERRORS)
         size = torch.exp(low + (high - low) * self._uniform(len(rows), 1, 1))

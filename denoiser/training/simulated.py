@@ -180,6 +180,9 @@ class SimulatedStreams:
         InputError: the patch is larger than the bank's units.
     """
 
+    simulated = True
+    """Light and units are known."""
+
     def __init__(
         self,
         count: int = 128,

@@ -41,6 +41,7 @@ from denoiser.training.train_config import TrainConfig as TrainConfig
 from denoiser.training.train_config import training_record
 from denoiser.training.training_source import TrainingSource
 from denoiser.weights import load_weights, save_weights
+from spikecam_env.datasets import twin_recordings
 from spikecam_env.errors import InputError
 from spikecam_env.run_folder import run_folder
 from spikecam_env.torch_settings import torch_settings
@@ -78,13 +79,14 @@ def _trained(config: TrainConfig, progress: bool) -> Path:
     device, kind = torch.device(config.device), config.source
     run = _begun(config)
     few = None if kind.whole_bank else config.steps * config.batch
+    bank = None if config.recordings else Bank.drawn(config.seed, device, streams=few, progress=progress)
     source = kind(
         config.recipe,
         taken=config.batch,
         patch=config.patch,
         device=device,
         seed=config.seed + run.step,  # a resumed run meets other streams
-        bank=Bank.drawn(config.seed, device, streams=few, progress=progress),
+        bank=bank,
         compiled=config.compiled or device.type == "cuda",
         **_own(config),
     )
@@ -107,14 +109,19 @@ def _begun(config: TrainConfig) -> Run:
 
 def _own(config: TrainConfig) -> dict[str, Any]:
     """Arguments of the streams that not every source has; InputError for a teacher of other windows."""
-    recipe, teacher = config.recipe, config.teacher
+    recipe, teacher, own = config.recipe, config.teacher, _recorded(config)
     if not isinstance(recipe, Recipe) or teacher is None:
-        return {} if config.frames_a_step is None else {"frames_a_step": config.frames_a_step}
+        return own if config.frames_a_step is None else own | {"frames_a_step": config.frames_a_step}
     found, network, _ = load_weights(teacher)
     if found.layout != recipe.layout:
         raise InputError(f"teacher is {teacher!r}, weights of another mode; give a file of this mode")
     network = network.to(config.device, memory_format=torch.channels_last)  # type: ignore[call-overload]
-    return {"teacher": network.requires_grad_(False)}
+    return own | {"teacher": network.requires_grad_(False)}
+
+
+def _recorded(config: TrainConfig) -> dict[str, Any]:
+    """The recordings to learn from, where some are given."""
+    return {"recordings": twin_recordings(config.recordings)} if config.recordings else {}
 
 
 def _learn(
@@ -139,8 +146,9 @@ def _learn(
         return weights
 
     run.set_rate(rate_at(config.lr, 0, 0.0))  # of the steps that come before a capture
-    # on a GPU a few steps are taken meanwhile
-    step = captured(lambda: _step(run, source), source.streams.device, source.streams.rng)
+    # on a GPU a few steps are taken meanwhile; what comes from files cannot be replayed
+    device = torch.device("cpu") if config.recordings else source.streams.device
+    step = captured(lambda: _step(run, source), device, source.streams.rng)
     while (done := share_done(config, run)) < 1.0:
         run.set_rate(rate_at(config.lr, run.step, done))
         losses.append(step())
@@ -164,11 +172,21 @@ def validation(config: TrainConfig) -> Callable[[nn.Module], dict[str, float]]:
     """Gives PSNR against light 1.0 [dB] of a network and of simpler guesses, always along the same held-out streams."""
     streams, patch, passes = config.source.held_out
     device, seed = torch.device(config.device), config.seed + VALIDATION_SEED
-    bank = Bank.drawn(seed, device, textures=32, units=16)
+    recorded = _recorded(config)
+    if recorded:
+        recorded["held_out"] = True
+    bank = None if recorded else Bank.drawn(seed, device, textures=32, units=16)
 
     def scores(network: nn.Module) -> dict[str, float]:
         source = config.source(
-            config.recipe, taken=streams, pool=1, patch=patch or config.patch, device=device, seed=seed, bank=bank
+            config.recipe,
+            taken=streams,
+            pool=1,
+            patch=config.patch if recorded else patch or config.patch,
+            device=device,
+            seed=seed,
+            bank=bank,
+            **recorded,
         )
         network.eval()
         errors = source.errors(network, passes or config.validate_passes)

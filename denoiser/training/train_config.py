@@ -88,6 +88,8 @@ class TrainConfig:
     """Of `best` and `fast`: weights whose rates the network is to learn instead of the light, a file or "best"."""
     width: Annotated[int | None, _width] = None
     """Channels of a reconstructor; None: the recipe's."""
+    recordings: Annotated[tuple[str, ...], _recordings] = ()
+    """.h5 recordings with a clean twin, and folders of datasets, whose streams are learnt instead of simulated ones."""
     frames_a_step: Annotated[int, WholeRange(1, WINDOW).check] = OF_MODE
     """Frames by which the streams of a reconstructor go on: 12."""
 
@@ -147,6 +149,12 @@ def _weights(value: Any, name: str) -> str:
     if not isinstance(value, str):
         raise InputError(f"{name} is {value!r}; it must be the path of weights, or a mode's name")
     return value
+
+
+def _recordings(value: Any, name: str) -> tuple[str, ...]:
+    if isinstance(value, str | os.PathLike) or not all(isinstance(path, str | os.PathLike) for path in value):
+        raise InputError(f"{name} is {value!r}; it must be a list of paths")
+    return tuple(map(str, value))
 
 
 def _width(value: Any, _: str) -> int:

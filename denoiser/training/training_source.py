@@ -6,14 +6,16 @@ A mode is added by a class of `TrainingSource` and its row in `train_config.SOUR
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from typing import Any, ClassVar, NamedTuple, TypeAlias
 
 import torch
 from torch import Tensor, nn
 
 from denoiser.ground.number_type import number_type
+from denoiser.training.recorded import RecordedStreams
 from denoiser.training.simulated import TWINS, Bank, SimulatedStreams, in_turn
+from spikecam_env.datasets import TwinRecording
 
 
 class HeldOut(NamedTuple):
@@ -29,7 +31,13 @@ class HeldOut(NamedTuple):
 class TrainingSource(ABC):
     """Streams that networks of a recipe learn from, some of them a step."""
 
-    options: ClassVar[dict[str, Any]] = {"batch": 16, "validate_every": 1000, "validate_passes": 24, "start": None}
+    options: ClassVar[dict[str, Any]] = {
+        "batch": 16,
+        "validate_every": 1000,
+        "validate_passes": 24,
+        "start": None,
+        "recordings": (),
+    }
     """Options of `TrainConfig` that not every mode has alike: those of this one, with their defaults."""
     sides: ClassVar[range] = range(16, 129, 16)
     """Of a patch [pixels]."""
@@ -64,7 +72,7 @@ Guesses: TypeAlias = tuple[Tensor, dict[str, tuple[Tensor, Tensor]]]
 
 
 class StreamSource(TrainingSource):
-    """Simulated streams, taken in turn.
+    """Simulated streams, or streams of recordings, taken in turn.
 
     Args:
         recipe: of the network.
@@ -75,6 +83,8 @@ class StreamSource(TrainingSource):
         pool: streams for each one of a step; default: `pool` of the class.
         bank: as for `SimulatedStreams`.
         compiled: as for `SimulatedStreams`.
+        recordings: from which streams are cut instead of being simulated.
+        held_out: whether these are for validation (`recorded.py`).
     """
 
     pool: ClassVar[int] = 1
@@ -91,10 +101,15 @@ class StreamSource(TrainingSource):
         pool: int | None = None,
         bank: Bank | None = None,
         compiled: bool = False,
+        recordings: Sequence[TwinRecording] = (),
+        held_out: bool = False,
     ) -> None:
         self.taken = taken
         count = taken * (self.pool if pool is None else pool)
-        self.streams = SimulatedStreams(count, patch, device, seed, bank=bank, compiled=compiled, twins=self.twins)
+        if recordings:
+            self.streams = RecordedStreams(list(recordings), held_out, count, patch, device, seed, self.twins)
+        else:
+            self.streams = SimulatedStreams(count, patch, device, seed, bank=bank, compiled=compiled, twins=self.twins)
         self._type = number_type("auto", device)
         self._next = torch.zeros((), dtype=torch.int64, device=device)
 

@@ -37,6 +37,9 @@ REACH.  More give the same error."""
 NO_POINT = -1
 """Number of the point at a pixel where none comes."""
 
+NOWHERE = -1.0
+"""Nearness of a point whose path is unknown: it comes to no place."""
+
 
 class MovingPicture(NamedTuple):
     """A picture and the paths of its points to another one."""
@@ -48,7 +51,7 @@ class MovingPicture(NamedTuple):
     bend: Pictures
     """(H, W, 2) [pixels]."""
     near: Pictures
-    """(H, W) nearness, 1 / depth; all 1 where depth is unknown."""
+    """(H, W) nearness, 1 / depth; all 1 where depth is unknown; NOWHERE where a path is."""
     hidden: Masks
     """(H, W) points that the other picture cannot show."""
 
@@ -73,13 +76,15 @@ def lay_between(before: MovingPicture, after: MovingPicture, share: Any, out: Pi
         for column in range(columns):
             first, second = points0[row, column], points1[row, column]
             if first == NO_POINT and second == NO_POINT:
-                out[row, column] = (one - share) * picture0[row, column] + share * picture1[row, column]
+                out[row, column] = picture0[row, column] + share * (picture1[row, column] - picture0[row, column])
                 continue
             weight, light = _share_of_later(near0, hidden0, first, near1, hidden1, second, share), np.float32(0)
             if weight < one:
-                light += (one - weight) * _seen(picture0, near0, shift0, first, row, column)
-            if weight > 0:
-                light += weight * _seen(picture1, near1, shift1, second, row, column)
+                light = _seen(picture0, near0, shift0, first, row, column)
+            if weight == one:
+                light = _seen(picture1, near1, shift1, second, row, column)
+            elif weight > 0:
+                light += weight * (_seen(picture1, near1, shift1, second, row, column) - light)
             out[row, column] = light
 
 
@@ -111,6 +116,8 @@ def arrivals(shift: Pictures, near: Pictures) -> NDArray[np.int32]:
     point, distance = np.full(near.shape, NO_POINT, np.int32), np.empty(near.shape, np.float32)
     for row in range(rows):
         for column in range(columns):
+            if near[row, column] < 0:
+                continue
             x, y = np.float32(column) + shift[row, column, 0], np.float32(row) + shift[row, column, 1]
             left, right = max(np.ceil(x - reach), 0), min(np.floor(x + reach), columns - 1)
             top, bottom = max(np.ceil(y - reach), 0), min(np.floor(y + reach), rows - 1)

@@ -1,7 +1,8 @@
 """The interval between two pictures of a stream: when its keys lie, and the light at each.
 
 motion unknown    light is linear in time; keys at the whole frames next to both pictures
-motion known      light is carried along it (`along_motion.py`); keys also between, so that little moves from key to key
+motion known      given, or found (`found_motion.py`): light is carried along it (`along_motion.py`); keys also between,
+                  so that little moves from key to key
 """
 
 from __future__ import annotations
@@ -12,6 +13,7 @@ from typing import Any
 import numpy as np
 
 from scenes.film.along_motion import MovingPicture, lay_between
+from scenes.film.found_motion import found_motion
 from scenes.film.given_picture import GivenPicture
 from scenes.film.point_paths import fastest, moving_pictures, with_outlines
 from scenes.keys import AT_REST, interval_for, key_frames
@@ -52,6 +54,17 @@ class Interval:
             sides = (first[0], second[0]), (first[1], second[1])
         return cls(before, after, moving_pictures((before.light, after.light), *sides, motion_is))
 
+    @classmethod
+    def of_film(cls, before: Pictures, after: Pictures, *, moving: bool) -> Interval:
+        """The interval of two pictures (h, w) of a film, at 0 and 1; `moving`: along the motion found between them."""
+        first, second = (GivenPicture(at, light, None, None) for at, light in enumerate((before, after)))
+        return cls(first, second, found_motion(before, after) if moving else None)
+
+    @property
+    def fastest(self) -> float:
+        """The fastest that a point moves whose path is known [pixels over the interval]."""
+        return 0.0 if self.moving is None else fastest(self.moving)
+
     def key_frames(self, motion_per_key: float) -> Floats:
         """Whole frames (K,) from the one after the earlier picture to the one before the later; none within a frame.
 
@@ -66,15 +79,17 @@ class Interval:
             return np.empty(0)
         if self.moving is None or first == last:
             return np.unique([first, last]).astype(np.float64)
-        step = interval_for(fastest(self.moving) / (self.after.at - self.before.at), motion_per_key)
+        step = interval_for(self.fastest / (self.after.at - self.before.at), motion_per_key)
         return key_frames(self.after.light.shape, first, last, step, AT_REST)
 
     def at(self, frame: float) -> Pictures:
         """Light (h, w) at a frame; the pictures themselves at their own times."""
         before, after = self.before, self.after
         share = np.float32((frame - before.at) / (after.at - before.at))
-        if self.moving is None or share in (0, 1):
-            return np.asarray(before.light * (np.float32(1) - share) + after.light * share)
+        if share in (0, 1):
+            return (after if share else before).light
+        if self.moving is None:
+            return np.asarray(before.light + share * (after.light - before.light))
         light = np.empty_like(before.light)
         lay_between(*self.moving, share, light)
         return light

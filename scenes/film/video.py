@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from copy import copy
+from itertools import pairwise
 from os import PathLike
 from typing import Literal
 
@@ -11,6 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from scenes.exposure import checked_interval
+from scenes.film.between_pictures import Interval
 from scenes.film.film_files import FilmOptions, read_film
 from scenes.film.transfer import CHANNELS, curve
 from scenes.keys import LONGEST_INTERVAL, check_frames, interval_for, paint_keys
@@ -19,9 +21,13 @@ from spikecam_env.errors import InputError, unknown_name
 from spikecam_env.sensor import Keyframes
 from spikecam_env.types import Pictures
 
-INTERPOLATIONS = ("linear", "hold")
+INTERPOLATIONS = ("motion", "linear", "hold")
 SHORTEST, LONGEST = 0.01, 1e12
 """Of a film [frames].  Shorter ones would turn round many times a frame; the longest takes nine months at 40 kHz."""
+MOTION_A_KEY = 1.0
+"""Motion between two keys, where it was found [pixels], as far as whole frames allow."""
+MOST_INTERVALS = 24
+"""Between pictures whose motion is kept for the next call: 130 MB at 250 x 400."""
 
 
 class VideoScene:
@@ -44,7 +50,8 @@ class VideoScene:
         transfer: from values to linear light, as `transfer.py` names it: "srgb", "bt709", "gamma2.2", "linear",
             default: that of the file, "gamma2.2" for arrays.
         channel: "luminance", "red", "green" or "blue".
-        interpolation: of light in time between two pictures: "linear", or "hold": the former until the next, within a
+        interpolation: of light in time between two pictures: "motion": carried along the motion that is found between
+            them (`found_motion.py`), linear where none is; "linear"; or "hold": the former until the next, within a
             frame.
         times_s: (T,) the time of every picture [s].
         slow: the file plays so many times slower than life: its time stamps are divided by it.
@@ -75,7 +82,7 @@ class VideoScene:
         *,
         transfer: str | None = None,
         channel: str = "luminance",
-        interpolation: Literal["linear", "hold"] = "linear",
+        interpolation: Literal["motion", "linear", "hold"] = "motion",
         times_s: ArrayLike | None = None,
         slow: float = 1.0,
         seconds: float | None = None,
@@ -101,6 +108,7 @@ class VideoScene:
         self._light = np.stack([(light[0] + span * picture).astype(kept) for picture in taken.light])
         self._gain = np.float32(1)
         self._hold = interpolation == "hold"
+        self._intervals: dict[int, Interval] = {}
         self._rate_hz = taken.rate_hz
         self.shape = (int(self._light.shape[1]), int(self._light.shape[2]))
         self.frame_rate_hz = float(frame_rate_hz)
@@ -111,6 +119,10 @@ class VideoScene:
 
     def __repr__(self) -> str:
         return f"VideoScene(pictures={self.pictures}, shape={self.shape}, {self.frames_per_picture:g} frames each)"
+
+    def __getstate__(self) -> dict[str, object]:
+        """Without the motion that was found, which follows from the pictures."""
+        return self.__dict__ | {"_intervals": {}}
 
     @property
     def pictures(self) -> int:
@@ -149,7 +161,8 @@ class VideoScene:
         return other
 
     def radiance(self, start: int, stop: int, gaze: Gaze | None = None) -> Keyframes:
-        """Keys that cover frames [start, stop], at most 64 apart: the whole frames next to every picture's time."""
+        """Keys that cover frames [start, stop], at most 64 apart: the whole frames next to every picture's time, and
+        those that keep the motion from key to key small."""
         check_frames(start, stop)
         frame = self._key_frames(start, stop)
         if gaze is not None:
@@ -172,8 +185,7 @@ class VideoScene:
             seen = self._picture(min(int(place), self.pictures - 1))
         else:
             before = min(int(place), self.pictures - 2)
-            share = np.float32(place - before)
-            seen = self._picture(before) * (1 - share) + self._picture(before + 1) * share
+            seen = self._interval(before).at(place - before)
         pan, tilt = gaze.at(frame) if gaze else (0.0, 0.0)
         if (pan, tilt) != (0.0, 0.0):
             shift = np.array([[1.0, 0.0, pan], [0.0, 1.0, tilt]])
@@ -185,6 +197,20 @@ class VideoScene:
     def _picture(self, number: int) -> Pictures:
         """A picture's light; films are kept in half precision, in which nothing is to be computed."""
         return np.asarray(self._light[number].astype(np.float32, copy=False))
+
+    def _interval(self, number: int) -> Interval:
+        """From a picture to the next; its motion, if that is wanted and frames of the camera lie between them."""
+        found = self._intervals.get(number)
+        if found is None:
+            pair = self._picture(number), self._picture(number + 1)
+            found = Interval.of_film(*pair, moving=self._moves(number))
+            self._intervals[number] = found
+            for oldest in list(self._intervals)[:-MOST_INTERVALS]:
+                self._intervals.pop(oldest, None)
+        return found
+
+    def _moves(self, number: int) -> bool:
+        return self.interpolation == "motion" and bool(self._knots[number + 1] - self._knots[number] > 1)
 
     def _place(self, frame: float) -> float:
         """Where in the film a frame is, in pictures and shares of one; it turns round at either end."""
@@ -204,8 +230,22 @@ class VideoScene:
         after = np.searchsorted(inner, grid, "right").clip(1, len(inner) - 1)
         wide = inner[after] - inner[after - 1] > LONGEST_INTERVAL
         frame = np.union1d(changes, grid[wide])
+        if self.interpolation == "motion":
+            frame = self._with_moving(frame, start, stop)
         first = np.searchsorted(frame, start, "right") - 1
         return np.asarray(frame[first : np.searchsorted(frame, stop) + 1], np.int64)
+
+    def _with_moving(self, frame: NDArray[np.int64], start: int, stop: int) -> NDArray[np.int64]:
+        """With keys between, at multiples of a step that the interval's fastest point sets."""
+        kept = [frame]
+        for begin, end in pairwise(frame):
+            if begin < stop and start < end:
+                number = min(int(self._place((begin + end) / 2)), self.pictures - 2)
+                speed = self._interval(number).fastest / (self._knots[number + 1] - self._knots[number])
+                step = interval_for(speed, MOTION_A_KEY)
+                if step < LONGEST_INTERVAL:
+                    kept.append(np.arange(begin // step + 1, -(-end // step)) * step)
+        return np.unique(np.concatenate(kept))
 
     def _changes(self, low: int, high: int) -> NDArray[np.int64]:
         """The whole frames in [low, high] next to times at which the light takes another course."""

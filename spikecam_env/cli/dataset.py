@@ -1,4 +1,4 @@
-"""`spikecam dataset`: SPIFT_N and PHM_N, made and verified."""
+"""`spikecam dataset`: SPIFT_N, PHM_N and cuts of films, made and verified."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import tyro
 
 from spikecam_env.cli.camera import CameraOptions
 from spikecam_env.cli.options import Size
-from spikecam_env.numbers import Count, Seed, Whole, Workers
+from spikecam_env.numbers import Count, Positive, Seed, Whole, Workers
 
 if TYPE_CHECKING:
     from spikecam_env.datasets import Plan
@@ -30,10 +30,6 @@ class DatasetOptions:
     """Seed of the scenes and the cameras; the same seed gives the same bytes."""
     truth_every: Whole = 100
     """Frames between ground truths (radiance, flow, object number, depth, poses); 0: none."""
-    mean_interval: float = 10.0
-    """Exposure: frames between spikes, on average over the picture."""
-    renderer: Literal["auto", "egl-hardware", "egl-software", "osmesa", "embree"] = "auto"
-    """Back-end that draws; auto: the best that works here, and the same one when a run is continued."""
     camera: CameraOptions = field(default_factory=CameraOptions)
     jobs: Workers = 1
     """Worker processes on this machine, or workers of a local Ray cluster."""
@@ -47,9 +43,7 @@ class DatasetOptions:
             "shape": self.size,
             "seed": self.seed,
             "truth_every": self.truth_every,
-            "mean_interval": self.mean_interval,
             "model": self.camera.load(),
-            "renderer": self.renderer,
         }
 
     def make(self, plan: Plan) -> None:
@@ -58,14 +52,29 @@ class DatasetOptions:
 
         built = build(plan, self.out, jobs=self.jobs, ray=self.ray, progress=True)
         size = f"{built.bytes / 1e9:.3g} GB"
-        print(f"{self.out}: {built.made} scenes made, {built.kept} were there, {size} (renderer: {built.renderer})")
+        drawn = "" if plan.films is not None else f" (renderer: {built.renderer})"
+        print(f"{self.out}: {built.made} scenes made, {built.kept} were there, {size}{drawn}")
         if built.seconds:
             spent = ", ".join(f"{what} {s:.3g}" for what, s in sorted(built.seconds.items(), key=lambda i: -i[1]))
             print(f"seconds over all workers: {spent}")
 
 
 @dataclass
-class SpiftN(DatasetOptions):
+class DrawnOptions(DatasetOptions):
+    """Options of datasets of the catalogue's scenes."""
+
+    mean_interval: float = 10.0
+    """Exposure: frames between spikes, on average over the picture."""
+    renderer: Literal["auto", "egl-hardware", "egl-software", "osmesa", "embree"] = "auto"
+    """Back-end that draws; auto: the best that works here, and the same one when a run is continued."""
+
+    def settings(self) -> dict[str, Any]:
+        """As fields of a `Plan`."""
+        return {**super().settings(), "mean_interval": self.mean_interval, "renderer": self.renderer}
+
+
+@dataclass
+class SpiftN(DrawnOptions):
     """Random scenes: 100 to train on and 10 to test, as in the paper, each with a camera of its own.
 
     example:  spikecam dataset spift-n --out spift --jobs 2
@@ -83,7 +92,7 @@ class SpiftN(DatasetOptions):
 
 
 @dataclass
-class PhmN(DatasetOptions):
+class PhmN(DrawnOptions):
     """The ten well-designed scenes: ball, cook, dice, doll, fan, fly, hand, jump, poker, top.
 
     example:  spikecam dataset phm-n --out phm --jobs 2
@@ -96,6 +105,45 @@ class PhmN(DatasetOptions):
         from spikecam_env.datasets import PHM, phm_n
 
         self.make(phm_n(scenes=self.scenes or PHM, **self.settings()))
+
+
+@dataclass(kw_only=True)
+class Films(DatasetOptions):
+    """Cuts of films: the pixels of a part of each picture, from the film's first picture on.
+
+    The defaults are those of REDS-SPK, DAVIS-SPK and GoPro-SPK (docs/datasets.md).
+
+    example:  spikecam dataset films val_sharp --out reds-spk --model ideal
+              spikecam export reds-spk --frames 41 --clips 10 --out reds-zoo
+    """
+
+    folder: tyro.conf.Positional[Path]
+    """Folder of films, as `spikecam film` takes them: videos, folders of pictures, .csv lists, .npy arrays."""
+    frames: Count = 221
+    """Spike frames of each cut, from the film's first picture on."""
+    size: Size = (256, 256)
+    """Rows and columns of each cut; the film is not made smaller."""
+    truth_every: Whole = 20
+    """Frames between ground truths (the film's light); 0: none."""
+    cuts: Count = 1
+    """Cuts from each film, at places that the seed draws, each with a camera of its own."""
+    split: Literal["train", "test"] = "test"
+    """Folder of the recordings."""
+    film_rate: Positive | None = 2000.0
+    """Pictures a second; 2000 are 20 spike frames a picture.  None: by the films' time stamps."""
+    transfer: str | None = "linear"
+    """From values to light: linear, srgb, bt709, gamma2.2 (or another power); None: that of the files."""
+    interpolation: Literal["motion", "linear", "hold"] = "motion"
+    """Light between two pictures: carried along the motion found between them, a straight line, or the earlier picture
+    held until the next."""
+    white: Positive = 0.6
+    """Light of the films' full scale [spikes/frame]; 0.6 in Spike-Zoo's REDS clips."""
+
+    def run(self) -> None:
+        from spikecam_env.datasets import FilmFolder, film_cuts
+
+        films = FilmFolder(self.folder, self.film_rate, self.transfer, self.interpolation, self.white)
+        self.make(film_cuts(films, cuts=self.cuts, split=self.split, **self.settings()))
 
 
 @dataclass
@@ -131,6 +179,7 @@ class Dataset:
     action: (
         Annotated[SpiftN, tyro.conf.subcommand("spift-n", prefix_name=False)]
         | Annotated[PhmN, tyro.conf.subcommand("phm-n", prefix_name=False)]
+        | Annotated[Films, tyro.conf.subcommand("films", prefix_name=False)]
         | Annotated[Verify, tyro.conf.subcommand("verify", prefix_name=False)]
     )
 

@@ -10,7 +10,7 @@ import tyro
 
 from spikecam_env.cli.mode_weights import Mode
 from spikecam_env.cli.reading import ReadingOptions
-from spikecam_env.numbers import Count
+from spikecam_env.numbers import Count, Whole
 
 if TYPE_CHECKING:
     import numpy as np
@@ -36,6 +36,8 @@ class Denoise:
     """Folder for denoised.h5, pictures.png, film.mp4 and summary.json."""
     mode: Mode = "best"
     """Which DnSS: `best`, `fast` (a quarter of its weights), or `paper` (the paper's network; slower)."""
+    weights: Path | None = None
+    """Weights of your own (`spikecam train`), in place of the mode's."""
     engine: Literal["torch"] = "torch"
     """The library that computes the network; there is one."""
     window: Count | None = None
@@ -45,6 +47,10 @@ class Denoise:
     """Not for `paper`: passes that overlap by half: less error, no seams, twice the time."""
     calibration: Path | None = None
     """Not for `paper`: maps.h5 of `spikecam calibrate`, or its folder: the camera's fixed pattern is then taken out."""
+    first: Whole = 0
+    """First frame of the recording to denoise."""
+    count: Count | None = None
+    """Frames to denoise; default: all from there on."""
     film: bool = True
     """Also write film.mp4, noisy beside denoised: at most 240 pictures, evenly over the recording."""
     reading: ReadingOptions = field(default_factory=ReadingOptions)
@@ -54,20 +60,27 @@ class Denoise:
         from spikecam_env.cli.table import table
         from spikecam_env.streams import read_recording
 
-        recording = read_recording(self.file, **self.reading.options())
+        part: dict[str, Any] = {"first": self.first, "count": self.count}
+        recording = read_recording(self.file, **part, **self.reading.options())
         print(f"{self.file}: {recording}")
         with out_folder(self.out) as folder:
             found = self._restored(recording)
             self._write_stream(folder, recording, found)
             self._write_pictures(folder, found)
             rows, speed = found.rows(), found.speed()
-            summary = {"file": str(self.file), "mode": self.mode, "window": found.window, "speed": speed, "rows": rows}
+            summary = {"file": str(self.file), "first": self.first, "mode": self._name, "window": found.window}
+            summary |= {"speed": speed, "rows": rows}
             write_json(folder / "summary.json", summary)
             written = sorted(path.name for path in folder.iterdir())
         print(table(rows))
         print()
         print(table([speed]))
         print(f"wrote {', '.join(written)} in {self.out}")
+
+    @property
+    def _name(self) -> str:
+        """Of the denoiser."""
+        return self.mode if self.weights is None else self.weights.name
 
     def _restored(self, recording: Recording) -> DenoisedRecording:
         from denoiser import OnlineDnSS
@@ -82,19 +95,30 @@ class Denoise:
 
         noisy = recording.spikes
         window = checked_window(self.window, len(noisy))
-        light = light_at(self.file, whole_windows(len(noisy), window), noisy.shape[1:])
+        light = light_at(self.file, whole_windows(len(noisy), window), noisy.shape[1:], self.first)
         options: dict[str, Any] = {"overlap": self.overlap, "unit": self.calibration, "engine": self.engine}
-        online = OnlineDnSS.pretrained(self.mode, output="both", **options)
+        if self.weights is None:
+            online = OnlineDnSS.pretrained(self.mode, output="both", **options)
+        else:
+            online = OnlineDnSS.from_file(self.weights, output="both", **options)
         denoised, planes, seconds = restore(noisy, online, [*picture_frames(len(noisy), window), *light])
         return DenoisedRecording(
-            noisy, denoised, planes, light, window, recording.frame_rate_hz, seconds, online.latency
+            noisy,
+            denoised,
+            planes,
+            light,
+            window,
+            recording.frame_rate_hz,
+            seconds,
+            online.latency,
+            first=self.first,
         )
 
     def _write_stream(self, folder: Path, recording: Recording, found: DenoisedRecording) -> None:
         from spikecam_env.streams import SpikeWriter
 
         attributes = {k: v for k, v in recording.attributes.items() if k in ("model", "seed", "scene")}
-        attributes |= {"denoiser": self.mode, "source": self.file.name}
+        attributes |= {"denoiser": self._name, "source": self.file.name, "first": self.first}
         shape = found.denoised.shape[1:]
         with SpikeWriter(folder / "denoised.h5", shape, recording.frame_rate_hz, **attributes) as writer:
             writer.append(found.denoised)
@@ -107,7 +131,8 @@ class Denoise:
         white, rate_hz = found.white, found.frame_rate_hz
 
         def picture(frame: int, *, light: bool) -> NDArray[np.uint8]:
-            return compose(found.panels(frame, light=light), white, corner=f"{self.mode}: {instant(frame, rate_hz)}")
+            when = instant(self.first + frame, rate_hz)
+            return compose(found.panels(frame, light=light), white, corner=f"{self._name}: {when}")
 
         write_picture(folder / "pictures.png", picture(found.middle, light=True))
         if self.film:

@@ -8,8 +8,8 @@ from typing import Annotated, Any
 
 import tyro
 
-from spikecam_env.cli.mode_weights import Mode, ModeWeights
-from spikecam_env.numbers import Positive, Seed, WholeRange
+from spikecam_env.cli.mode_weights import Denoiser, Mode, ModeWeights, Reconstruction
+from spikecam_env.numbers import Positive, Seed, WholeRange, Workers
 
 
 @dataclass
@@ -42,7 +42,8 @@ class Quick:
 class SpikeZoo:
     """PSNR and SSIM of pictures at the middle of clips in Spike-Zoo's layout, as Spike-Zoo computes them.
 
-    Rows: TFP and TFI over 41 frames of the noisy spikes and of each mode's, and its rate planes.  No random numbers.
+    Rows: pictures of the noisy spikes and of each mode's by TFP, TFI and our Spk2ImgNet, and the rate planes of each
+    mode.  No random numbers.  Beside each the seconds of one core for a picture.
 
     example:  spikecam evaluate spikezoo reds --out evaluation
     """
@@ -50,18 +51,25 @@ class SpikeZoo:
     folder: tyro.conf.Positional[Path]
     """Folder of spike/*.dat and gt/*.png of the same names, or test/ with them.  Pictures say rows and columns."""
     out: Path | None = None
-    """Folder for spikezoo.json, spikezoo.txt and spikezoo.jsonl; a run that was stopped goes on in it."""
-    modes: tuple[Mode, ...] = ("paper", "best")
-    """Modes to evaluate."""
+    """Folder for spikezoo.txt, .csv, .json and .jsonl, and the sheet of pictures spikezoo.png; a run that was stopped
+    goes on in it."""
+    modes: tuple[Denoiser, ...] = ("paper", "fast", "best", "best-overlap", "picture")
+    """Modes to evaluate; `paper` takes nearly all of the time."""
+    pictures: tuple[Reconstruction, ...] = ("tfp21", "tfp41", "tfi", "spk2img-clean", "spk2img-noisy")
+    """Pictures of the noisy and the denoised spikes."""
     rate: Positive = 0.6
     """Light [spikes/frame] that is white in the pictures; 0.6 in Spike-Zoo's REDS clips."""
+    jobs: Workers = 1
+    """Worker processes, one thread each; 1 works in this one, with all threads."""
     weights: ModeWeights = field(default_factory=ModeWeights)
 
     def run(self) -> None:
         from denoiser.evaluate.spikezoo import evaluate_spikezoo, report
 
-        options: dict[str, Any] = {"weights": self.weights.by_mode(), "rate": self.rate}
-        _show("spikezoo", self.out, report(evaluate_spikezoo(self.folder, self.modes, out=self.out, **options)))
+        options: dict[str, Any] = {"weights": self.weights.by_mode(), "rate": self.rate, "jobs": self.jobs}
+        options["pictures"] = self.pictures
+        result = evaluate_spikezoo(self.folder, self.modes, out=self.out, **options)
+        _show("spikezoo", self.out, report(result), "png", "csv")
 
 
 @dataclass
@@ -95,7 +103,7 @@ class TruthTests:
         _show("truth", self.out, report(evaluate_truth(self.static, self.moving, self.modes, out=self.out, **options)))
 
 
-def _show(name: str, out: Path | None, report: str) -> None:
+def _show(name: str, out: Path | None, report: str, *more: str) -> None:
     print(report, end="")
     if out is not None:
-        print(f"wrote {name}.json and {name}.txt in {out}")
+        print(f"wrote {', '.join(f'{name}.{kind}' for kind in (*more, 'json'))} and {name}.txt in {out}")

@@ -8,7 +8,7 @@ from typing import Annotated, Literal
 
 import tyro
 
-from spikecam_env.numbers import Count, Positive
+from spikecam_env.numbers import Count, Positive, Whole
 
 
 @dataclass
@@ -30,6 +30,10 @@ class Export:
     """Spike frames of a clip; odd."""
     clips: Count = 1
     """Clips from one recording at most, spread evenly over its frames of known light."""
+    first: Whole = 0
+    """First frame of a recording that a clip may have."""
+    count: Count | None = None
+    """Frames of a recording from there on that clips may have; default: all."""
     rate: Positive = 0.6
     """Light [spikes/frame] that is white; another one than 0.6 has to be set in Spike-Zoo's data configuration too."""
     bits: Literal[8, 16] = 8
@@ -46,6 +50,8 @@ class Export:
             self.out,
             frames=self.frames,
             clips=self.clips,
+            first=self.first,
+            count=self.count,
             rate=self.rate,
             bits=self.bits,
             stream=self.stream,

@@ -47,8 +47,9 @@ class FilmToSpikes:
     """From its values to linear light: srgb, bt709, gamma2.2 (or another power), linear; default: the file's."""
     channel: Literal["luminance", "red", "green", "blue"] = "luminance"
     """Colour to take as light: luminance, or one channel."""
-    interpolation: Literal["linear", "hold"] = "linear"
-    """Light between two pictures: a straight line, or the earlier picture held until the next."""
+    interpolation: Literal["motion", "linear", "hold"] = "motion"
+    """Light between two pictures: carried along the motion that is found between them (slower); a straight line; or the
+    earlier picture held until the next."""
     mean_interval: Positive = 10.0
     """Exposure: frames between spikes, on average over the film and the picture."""
     frames: Count | None = None
@@ -63,14 +64,17 @@ class FilmToSpikes:
     truth_every: Whole | None = None
     """Frames between ground truths (the film's light) in an .h5 file; 0: none.  Default: the frame in the middle alone,
     beside which `spikecam denoise` shows its pictures."""
+    clean: bool = False
+    """Also keep the spikes of the noise-free camera before the same light, in an .h5 file of twice the size: to train
+    on."""
 
     def run(self) -> None:
         from scenes import VideoScene
-        from spikecam_env.cli.recording import check_out, lit_frames, record_scene
+        from spikecam_env.cli.recording import check_out, lit_frames, record_scene, size_and_time
         from spikecam_env.cli.table import table
         from spikecam_env.sensor import SpikeSensor
 
-        check_out(self.out, self.frames or 1, self.size, self.truth_every)
+        check_out(self.out, self.frames or 1, self.size, self.truth_every, clean=self.clean)
         model = self.camera.load()
         sensor = SpikeSensor(model, self.size, self.seed, engine="auto")
         limit = self._limit(model.frame_rate_hz)
@@ -87,11 +91,12 @@ class FilmToSpikes:
             mean_interval=self.mean_interval,
         )
         frames = self._frames(limit, scene)
-        check_out(self.out, frames, self.size)
+        check_out(self.out, frames, self.size, clean=self.clean)
+        print(size_and_time(self.out, scene, sensor, frames, clean=self.clean), flush=True)
         attributes: dict[str, object] = {"model": model.name, "seed": self.seed, "scene": repr(scene)}
         attributes |= {"film": self.film.name, "transfer": scene.transfer, "gain": scene.gain}
         truth, what = lit_frames(self.out, frames, self.truth_every), f"record {self.film.name}"
-        spikes = record_scene(self.out, scene, sensor, frames, what, attributes, truth)
+        spikes = record_scene(self.out, scene, sensor, frames, what, attributes, truth, clean=self.clean)
         self._warn_if_off(frames * math.prod(self.size), spikes)
         done = self._done(scene, frames, sensor.engine, spikes)
         print(table([{"film to spikes": name, "": value} for name, value in done.items()]))

@@ -8,6 +8,10 @@ from typing import Literal
 
 Mode = Literal["best", "fast", "paper"]
 """Of `denoiser.passes.recipe.RECIPES`."""
+Denoiser = Literal["paper", "fast", "best", "best-overlap", "picture"]
+"""Modes, and `best` with overlapping passes."""
+Reconstruction = Literal["tfp21", "tfp41", "tfi", "spk2img-clean", "spk2img-noisy"]
+"""Of `denoiser.evaluate.judge.COLUMNS`."""
 
 
 @dataclass(frozen=True)

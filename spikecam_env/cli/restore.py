@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -55,6 +55,8 @@ class DenoisedRecording:
     """That the denoiser took."""
     latency: int
     """Of the denoiser [frames]."""
+    first: int = field(default=0, kw_only=True)
+    """Number in the recording of the first frame."""
 
     @property
     def film_frames(self) -> list[int]:
@@ -76,7 +78,7 @@ class DenoisedRecording:
                 line = what if known is None else f"{what}, PSNR {light_db(shown, known):.2f} dB"
                 panels.append(PicturePanel(shown, title, line))
         if known is not None:
-            panels.append(PicturePanel(known, "true light", instant(frame, self.frame_rate_hz)))
+            panels.append(PicturePanel(known, "true light", instant(self.first + frame, self.frame_rate_hz)))
         return panels
 
     @property
@@ -159,15 +161,16 @@ def whole_windows(frames: int, window: int) -> range:
     return range(window // 2, frames - window // 2)
 
 
-def light_at(path: Path, frames: Sequence[int], shape: tuple[int, int]) -> dict[int, Pictures]:
-    """True light of a recording in the middle of some of these frames, at most MOST_JUDGED, by frame.
+def light_at(path: Path, frames: Sequence[int], shape: tuple[int, int], first: int = 0) -> dict[int, Pictures]:
+    """True light of a recording in the middle of some of these frames, at most MOST_JUDGED, by frame.  Frames are
+    counted from the recording's frame `first`.
 
     Empty for a file that is not of this package or has no truth.
     """
     if path.suffix.lower() not in HDF5 or not is_recording(path):
         return {}
     instants = read_truth(path, ("frame",)).get("frame", np.empty(0))
-    rows = {int(at): row for row, at in enumerate(instants.ravel().tolist()) if at % 1 == 0.5}
+    rows = {int(at) - first: row for row, at in enumerate(instants.ravel().tolist()) if at % 1 == 0.5}
     known = evenly([frame for frame in rows if frame in frames], MOST_JUDGED)
     return {frame: _light(path, rows[frame], shape) for frame in known}
 

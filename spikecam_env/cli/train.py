@@ -11,9 +11,11 @@ from spikecam_env.numbers import Count, Positive, Range, Seed, WholeRange, Worke
 
 @dataclass
 class Train:
-    """Train DnSS or a reconstructor on noisy and clean streams simulated on the fly; goes on from its last checkpoint.
+    """Train DnSS or a reconstructor on noisy and clean streams simulated on the fly, or on recordings; goes on from its
+    last checkpoint.
 
     example:  spikecam train --mode best --out runs/best
+    on films: spikecam train --start best --recordings clip.h5 --out runs/mine
     on a GPU: spikecam train --mode best --device cuda --batch 48 --minutes 7.6 --out runs/best
     """
 
@@ -47,6 +49,9 @@ class Train:
     start: str | None = None
     """Weights to begin from: a file of this command, or `best`, `fast` or `paper` for those that ship.  A network
     with fewer channels, or without the refine module, begins from a larger one.  Default: none."""
+    recordings: tuple[Path, ...] | None = None
+    """Learn from recordings with a clean twin instead: .h5 files of `spikecam film --clean`, folders of `spikecam
+    dataset`.  The last fifth of each is kept for validation.  Not for `picture`."""
     teacher: str | None = None
     """Weights whose rates `best` or `fast` learns instead of the true light, as a small network does better: a file, or
     `best`."""

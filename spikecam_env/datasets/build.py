@@ -96,7 +96,7 @@ def build(plan: Plan, folder: str | Path, *, jobs: int = 1, ray: str | None = No
 
 def _with_renderer(plan: Plan, folder: Path) -> Plan:
     """The plan with a back-end: where none is named, that of the dataset, or for a new one the best of this machine."""
-    if plan.renderer != AUTO:
+    if plan.renderer != AUTO or plan.films is not None:
         return plan
     exists = (folder / NAME).exists()
     return replace(plan, renderer=Manifest.read(folder).settings["renderer"] if exists else first_that_works())

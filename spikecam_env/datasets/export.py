@@ -21,6 +21,7 @@ from spikecam_env.datasets.spikezoo import CLIP_FRAMES, RATE, Bits, write_clip
 from spikecam_env.errors import InputError
 from spikecam_env.names import distinct
 from spikecam_env.streams.hdf5 import open_recording, read_hdf5
+from spikecam_env.streams.packing import check_range
 from spikecam_env.untrusted import hdf5_values, numbers
 from spikecam_env.whole import whole_folder, write_text_whole
 
@@ -51,6 +52,8 @@ def export_spikezoo(
     *,
     frames: int = CLIP_FRAMES,
     clips: int = 1,
+    first: int = 0,
+    count: int | None = None,
     rate: float = RATE,
     bits: Bits = 8,
     stream: str = "spikes",
@@ -64,6 +67,8 @@ def export_spikezoo(
             themselves, and `export.json`.
         frames: of a clip, odd; the frame of known light is in the middle.
         clips: most from one recording, spread evenly over its frames of known light.
+        first: frame of a recording from which on clips are cut.
+        count: frames from there on, of which clips are cut; default all.
         rate: light [spikes/frame] that is white.
         bits: of a pixel of the picture, 8 or 16.
         stream: "spikes", or "clean" for the noise-free twin's.
@@ -84,7 +89,7 @@ def export_spikezoo(
     done: list[Exported] = []
     with whole_folder(out) as folder:
         for split, path in tqdm(recordings, desc="export", unit="recording", leave=False, disable=not progress):
-            for row, frame in _middles(path, frames, clips):
+            for row, frame in _middles(path, frames, clips, first, count):
                 name = f"{path.stem}-{frame}"
                 spikes = read_hdf5(path, first=frame - frames // 2, count=frames, stream=stream)[0]
                 light = _light(path, row, spikes.shape[1:])
@@ -106,23 +111,24 @@ def _recordings(source: Path) -> list[tuple[str, Path]]:
     return [(file["path"].rpartition("/")[0].partition("/")[0] or "test", source / file["path"]) for file in files]
 
 
-def _middles(path: Path, frames: int, most: int) -> list[tuple[int, int]]:
-    """(row of its truth, frame) of frames of known light with room about them, at most so many, spread evenly."""
+def _middles(path: Path, frames: int, most: int, first: int, count: int | None) -> list[tuple[int, int]]:
+    """(row of its truth, frame) of frames of known light with room about them, at most so many, spread evenly.  All is
+    inside the `count` frames from `first` on."""
     with open_recording(path) as recording:
         if "truth" not in recording.file.keys():  # noqa: SIM118 - `in` follows links
             raise InputError(f"{path} holds no truth; record it with --truth-every")
         instants = numbers(hdf5_values(recording.file, "truth/frame", str(path)), "truth/frame", str(path))
-        length = recording.frames("spikes")
+        first, stop = check_range(first, count, recording.frames("spikes"), str(path))
     reach = frames // 2
     whole = np.floor(instants.ravel())
-    room = [(row, int(frame)) for row, frame in enumerate(whole) if reach <= frame < length - reach]
+    room = [(row, int(frame)) for row, frame in enumerate(whole) if first + reach <= frame < stop - reach]
     if not room:
         raise InputError(
-            f"{path}: of {length} frames, none of known light has {reach} before and after it; record more, "
+            f"{path}: of {stop - first} frames, none of known light has {reach} before and after it; record more, "
             "or give fewer --frames"
         )
-    count = min(most, len(room))
-    return [room[(2 * i + 1) * len(room) // (2 * count)] for i in range(count)]
+    taken = min(most, len(room))
+    return [room[(2 * i + 1) * len(room) // (2 * taken)] for i in range(taken)]
 
 
 def _light(path: Path, row: int, shape: tuple[int, ...]) -> NDArray[np.float64]:

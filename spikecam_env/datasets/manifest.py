@@ -37,6 +37,15 @@ FORMAT = "spikecam-dataset/1"
 _STATE = {"bytes", "sha256"}
 
 
+class _Films(Declared):
+    """See `FilmFolder`."""
+
+    film_rate_hz: Positive | None
+    transfer: Name | None
+    interpolation: Name
+    white: Positive
+
+
 class _Settings(Declared):
     """Settings that the scenes of a dataset share, see `Plan`."""
 
@@ -46,9 +55,10 @@ class _Settings(Declared):
     frames: Count
     seed: Seed
     truth_every: Whole
-    mean_interval: Positive
+    mean_interval: Positive | None = None
     model: str
-    renderer: str
+    renderer: str | None = None
+    films: _Films | None = None
 
 
 class _File(Declared):

@@ -2,11 +2,13 @@
 
 SPIFT_N: random scenes to train on, and others to test.  PHM_N: the ten well-designed scenes, to test.
 Source: the paper, section "Datasets": 100 random scenes, 10 well-designed ones; ours are of our own making.
+Films: cuts of a folder of films (`films.py`).
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -16,12 +18,18 @@ from scenes.exposure import checked_interval
 from scenes.protocol import Scene
 from scenes.renderers.choose import BACKENDS
 from spikecam_env.checked import checked_count, checked_seed, checked_shape
+from spikecam_env.datasets.films import FilmFolder
 from spikecam_env.datasets.renderer import AUTO, renderer_of_process
 from spikecam_env.errors import InputError, unknown_name
 from spikecam_env.sensor import SensorModel
 
 RANDOM = "random"
 """The scene of the catalogue that its seed draws."""
+
+SPLITS = ("train", "test")
+
+DRAWN = ("mean_interval", "renderer")
+"""Settings of scenes that are drawn, which cuts of films do not have."""
 
 MOST_SCENES = 100_000
 """Of a split; the paper has 100."""
@@ -42,7 +50,7 @@ class PlannedScene:
     path: str
     """Path of its file in the dataset's folder; its first part is the split, "train" or "test"."""
     scene: str
-    """Its name in `scenes.catalogue.SCENES`."""
+    """Its name in `scenes.catalogue.SCENES`, or that of a film."""
     scene_seed: int
     """Seed of the scene's own draws."""
     unit_seed: int
@@ -72,16 +80,18 @@ class Plan:
     truth_every: int = 100
     """Frames between ground truths, at frames 0, truth_every, ...; 0 for none."""
     mean_interval: float = 10.0
-    """Mean interval between spikes, over the picture [frames]: the exposure."""
+    """Mean interval between spikes, over the picture [frames]: the exposure.  Films have their own."""
     model: SensorModel = field(default_factory=SensorModel.preset)
     renderer: str = AUTO
     """Back-end that draws: one of `scenes.renderers.choose.BACKENDS`, or "auto" for the best of the machine."""
+    films: FilmFolder | None = None
+    """Of which the scenes are cut; None: scenes are of the catalogue."""
 
     def __post_init__(self) -> None:
         if not self.entries:
             raise InputError(f"a {self.kind} dataset of no scenes; ask for 1 or more")
         for entry in self.entries:
-            if entry.scene not in SCENES:
+            if self.films is None and entry.scene not in SCENES:
                 raise unknown_name("scene", entry.scene, SCENES)
         checked_interval(self.mean_interval)
         if self.renderer not in (AUTO, *BACKENDS):
@@ -93,6 +103,8 @@ class Plan:
 
     def scene(self, entry: PlannedScene) -> Scene:
         """The scene of an entry."""
+        if self.films is not None:
+            return self.films.cut(entry.scene, entry.scene_seed, self.shape, self.frames, self.model.frame_rate_hz)
         return make_scene(
             entry.scene,
             shape=self.shape,
@@ -104,7 +116,7 @@ class Plan:
 
     def settings(self) -> dict[str, Any]:
         """Settings that the scenes share, as plain values."""
-        return {
+        plain = {
             "kind": self.kind,
             "shape": list(self.shape),
             "frames": self.frames,
@@ -114,6 +126,9 @@ class Plan:
             "model": self.model.toml(),
             "renderer": self.renderer,
         }
+        if self.films is None:
+            return plain
+        return {n: v for n, v in plain.items() if n not in DRAWN} | {"films": self.films.settings()}
 
 
 def spift_n(*, train: int = 100, test: int = 10, seed: int = 0, **settings: Any) -> Plan:
@@ -157,6 +172,39 @@ def phm_n(*, scenes: tuple[str, ...] = PHM, seed: int = 0, **settings: Any) -> P
             raise InputError(f"scene {name!r} is listed {scenes.count(name)} times; list it once")
     entries = tuple(PlannedScene(f"test/{name}.h5", name, seed, _seeds(seed, name, 0)[1]) for name in scenes)
     return Plan("phm-n", entries, seed=seed, **settings)
+
+
+def film_cuts(films: FilmFolder, *, cuts: int = 1, split: str = "test", seed: int = 0, **settings: Any) -> Plan:
+    """Cuts of films, each at a place and with a camera of its own.
+
+    Args:
+        films: the folder, and how light is made of its films.
+        cuts: from each film.
+        split: "train" or "test", the folder of the recordings.
+        seed: of all cuts.
+        settings: fields of `Plan`.
+
+    Raises:
+        InputError: as `FilmFolder.names`, and as `FilmFolder.cut` of the first film; an unknown split.
+
+    Example:
+        >>> from pathlib import Path
+        >>> Path("films").mkdir()
+        >>> np.save("films/wave.npy", np.random.default_rng(0).random((4, 20, 30)))
+        >>> [entry.path for entry in film_cuts(FilmFolder(Path("films")), cuts=2, shape=(8, 16), frames=60).entries]
+        ['test/wave-0.h5', 'test/wave-1.h5']
+    """
+    checked_seed(seed)
+    if split not in SPLITS:
+        raise unknown_name("split", split, SPLITS)
+    entries = tuple(
+        PlannedScene(f"{split}/{Path(name).stem}-{number}.h5", name, *_seeds(seed, name, number))
+        for name in films.names()
+        for number in range(checked_count(cuts, "cuts", MOST_SCENES))
+    )
+    plan = Plan("films", entries, seed=seed, films=films, **settings)
+    plan.scene(entries[0])  # options that no film can have are refused before anything is written
+    return plan
 
 
 def _seeds(seed: int, purpose: str, number: int) -> tuple[int, int]:

@@ -97,7 +97,9 @@ def sha256_of(path: Path, progress: Callable[[int], object] | None = None) -> st
 
 
 def _attributes(plan: Plan, entry: PlannedScene) -> dict[str, Any]:
-    shared = {name: value for name, value in plan.settings().items() if name not in ("shape", "frames", "kind")}
+    settings = plan.settings()
+    settings |= {name: value for name, value in settings.pop("films", {}).items() if value is not None}
+    shared = {name: value for name, value in settings.items() if name not in ("shape", "frames", "kind")}
     own = {"scene": entry.scene, "scene_seed": entry.scene_seed, "unit_seed": entry.unit_seed}
     return {"dataset": plan.kind, **shared, **own}
 

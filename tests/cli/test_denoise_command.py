@@ -11,6 +11,7 @@ from PIL import Image
 
 from denoiser import denoise
 from denoiser.evaluate.metrics import psnr_db
+from denoiser.weights import pretrained_path
 from spikecam_env.cli.screen.screen import MARGIN, panel_scale
 from spikecam_env.streams import SpikeWriter, middleTFP, read_recording, read_truth, save_npz, save_vidar_dat
 from tests.commands import film_in, picture_in, spikecam
@@ -75,6 +76,45 @@ def test_a_recording_has_the_light_of_its_middle_and_is_judged_by_it(disk: Path)
     assert scores["denoised rate", "one frame"] == pytest.approx(psnr_db(rate, light, light.max()))
     assert scores["denoised rate", "one frame"] > scores["noisy spikes", "mean of 41 frames"]
     assert alike(panel(picture_in(disk.with_name("out") / "pictures.png"), 3), light) > 0.999
+
+
+def test_a_part_of_a_recording_is_denoised_as_if_it_were_the_whole(disk: Path, tmp_path: Path, capsys) -> None:
+    part = ("--first", 40, "--count", 60, "--mode", "fast", "--no-film")
+    assert spikecam("denoise", disk, *part, "--out", tmp_path / "part") == 0
+    assert "true light" not in capsys.readouterr().err
+    spikes = read_recording(disk).spikes[40:100]
+    denoised = read_recording(tmp_path / "part" / "denoised.h5")
+    np.testing.assert_array_equal(denoised.spikes, denoise(spikes, "fast", output="spikes"))
+    summary = json.loads((tmp_path / "part" / "summary.json").read_text())
+    assert denoised.attributes["first"] == summary["first"] == 40
+    rate, light = denoise(spikes, "fast", output="rate")[FRAMES // 2 - 40], read_truth(disk)["radiance"][0]
+    assert summary["rows"][-1]["PSNR, light [dB]"] == pytest.approx(psnr_db(rate, light, light.max()))
+
+
+@pytest.mark.parametrize(
+    ("part", "said"),
+    [
+        (("--first", FRAMES), f"frames {FRAMES} to {FRAMES} asked of"),
+        (("--first", 100, "--count", 31), "frames 100 to 131 asked of"),
+        (("--first", -1), "--first -1"),
+        (("--count", 0), "--count 0"),
+    ],
+)
+def test_a_part_that_a_recording_has_not_ends_in_one_line(part, said: str, disk: Path, tmp_path: Path, capsys) -> None:
+    assert spikecam("denoise", disk, *part, "--out", tmp_path / "none") == 2
+    error = capsys.readouterr().err.strip().splitlines()
+    assert len(error) == 1 and said in error[0] and not (tmp_path / "none").exists()
+
+
+def test_weights_of_ones_own_take_the_place_of_the_mode(disk: Path, tmp_path: Path) -> None:
+    own = tmp_path / "own.pt"
+    own.write_bytes(pretrained_path("fast").read_bytes())
+    for name, which in (("own", ("--weights", own)), ("fast", ("--mode", "fast"))):
+        options = ("--count", 60, "--no-film", "--out", tmp_path / name)
+        assert spikecam("denoise", disk, *which, *options) == 0
+    a, b = (read_recording(tmp_path / name / "denoised.h5") for name in ("own", "fast"))
+    np.testing.assert_array_equal(a.spikes, b.spikes)
+    assert (a.attributes["denoiser"], b.attributes["denoiser"]) == ("own.pt", "fast")
 
 
 @pytest.mark.parametrize("suffix", [".dat", ".npz"])

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 import numpy as np
@@ -9,6 +10,8 @@ import pytest
 from made_films import greys, write_film
 from PIL import Image
 
+from scenes import VideoScene
+from spikecam_env.sensor import SpikeSensor
 from spikecam_env.streams import middleTFP, read_recording
 from tests.commands import spikecam
 
@@ -16,8 +19,8 @@ SMALL = ("--size", "16", "24")
 
 
 def printed(capsys: pytest.CaptureFixture[str]) -> dict[str, str]:
-    """The table's lines by their names."""
-    lines = capsys.readouterr().out.splitlines()[2:]
+    """The table's lines by their names, after the line of size and time."""
+    lines = capsys.readouterr().out.splitlines()[3:]
     return {line.rsplit("  ", 1)[0].strip(): line.rsplit("  ", 1)[1].strip() for line in lines}
 
 
@@ -42,7 +45,7 @@ def test_a_video_becomes_spikes_of_the_asked_interval(suffix: str, tmp_path: Pat
     assert spikes.mean() == pytest.approx(1 / 8, rel=0.01)
     said = printed(capsys)
     assert said["pictures"] == "4" and said["transfer"] == "srgb" and said["frames"] == "1200"
-    assert said["times"] == "100 pictures a second" and said["between pictures"] == "linear"
+    assert said["times"] == "100 pictures a second" and said["between pictures"] == "motion"
     assert float(said["mean interval got [frames]"]) == pytest.approx(8, rel=0.01)
 
 
@@ -120,6 +123,45 @@ def test_record_has_a_frame_rate_of_its_own(tmp_path: Path) -> None:
     assert np.array_equal(read_recording(tmp_path / "c.h5").spikes, a.spikes)
 
 
+def moving_film(path: Path, pictures: int = 6) -> Path:
+    """A step of light that moves two pixels a picture."""
+    film = np.full((pictures, 24, 40), 0.1)
+    for number in range(pictures):
+        film[number, :, 8 + 2 * number : 22 + 2 * number] = 0.5
+    np.save(path, film)
+    return path
+
+
+def test_a_clean_twin_lies_beside_spikes_that_are_the_same_with_it_and_without(tmp_path: Path) -> None:
+    film = moving_film(tmp_path / "f.npy")
+    options = ("--film-rate", 500, "--transfer", "linear", "--seed", 5, "--size", 24, 40)
+    assert spikecam("film", film, *options, "--out", tmp_path / "bare.h5") == 0
+    assert spikecam("film", film, *options, "--clean", "--out", tmp_path / "both.h5") == 0
+    noisy = read_recording(tmp_path / "both.h5").spikes
+    assert len(noisy) == 400  # 5 steps of 80 frames
+    np.testing.assert_array_equal(noisy, read_recording(tmp_path / "bare.h5").spikes)
+    shown = VideoScene(np.load(film), 500.0, (24, 40), transfer="linear", mean_interval=10.0)
+    twin = SpikeSensor("scsim", (24, 40), 5).clean_twin()
+    clean = read_recording(tmp_path / "both.h5", stream="clean").spikes
+    np.testing.assert_array_equal(clean, twin.step(shown.radiance(0, 400), 400))
+    assert clean.mean() == pytest.approx(0.1, rel=0.02) and not np.array_equal(clean, noisy)
+
+
+def test_size_and_time_are_said_before_a_long_recording_and_change_nothing(tmp_path: Path, capsys) -> None:
+    film = moving_film(tmp_path / "f.npy")
+    options = ("--film-rate", 50, "--transfer", "linear", "--size", 64, 96, "--clean")
+    for name, more in (("short", ("--frames", 640)), ("long", ())):
+        assert spikecam("film", film, *options, *more, "--out", tmp_path / f"{name}.h5") == 0
+    short, long = (line for line in capsys.readouterr().out.splitlines() if line.startswith(str(tmp_path)))
+    print(long)
+    assert short.endswith("short.h5: 640 frames (0.016 s), 983 kB with the clean twin")
+    stated = re.fullmatch(r".*long.h5: 4000 frames \(0.1 s\), ([\d.]+) MB with the clean twin, about \d+ s", long)
+    assert stated and 1e6 * float(stated[1]) == pytest.approx((tmp_path / "long.h5").stat().st_size, rel=0.15)
+    for stream in ("spikes", "clean"):
+        both = [read_recording(tmp_path / f"{name}.h5", stream=stream, count=640).spikes for name in ("short", "long")]
+        np.testing.assert_array_equal(*both)
+
+
 @pytest.mark.parametrize(
     ("args", "message"),
     [
@@ -136,6 +178,7 @@ def test_record_has_a_frame_rate_of_its_own(tmp_path: Path) -> None:
         (("p", "--film-rate", "100", "--frames", "9999"), "p lasts 800 (0.02 s)"),
         (("p", "--film-rate", "100", "--seconds", "nan"), "--seconds nan"),
         (("p", "--film-rate", "100", "--seconds", "1", "--frames", "1"), "give one of the two"),
+        (("p", "--film-rate", "100", "--clean", "--out", "x.dat"), "a clean twin (--clean) is kept in .h5 files only"),
         (("p", "--film-rate", "1e5"), "it must last 1 or more"),
         (("p", "--film-rate", "100", "--frame-rate", "0"), "frame_rate_hz = 0"),
         (("p", "--film-rate", "100", "--size", "0", "24"), "--size 0 24; it must be"),
@@ -153,7 +196,10 @@ def test_what_is_wrong_ends_in_one_line_and_nothing_is_left(args, message, tmp_p
         Path("p/list.csv").write_text("name,time_s\np0.png,0\np1.png,0\n")
     np.save("object.npy", np.array([{}], object), allow_pickle=True)
     before = sorted(tmp_path.rglob("*"))
-    assert spikecam("film", *args, "--out", "x.h5", *(() if "--size" in args else SMALL)) == 2
+    assert (
+        spikecam("film", *args, *(() if "--out" in args else ("--out", "x.h5")), *(() if "--size" in args else SMALL))
+        == 2
+    )
     error = capsys.readouterr().err.strip().splitlines()[-1]
     assert error.startswith("spikecam: ") and message in error
     assert sorted(tmp_path.rglob("*")) == before

@@ -63,6 +63,18 @@ def test_a_coloured_picture_is_read_as_grey(stream, tmp_path: Path) -> None:
     assert read_clip(*find_clips(tmp_path))[1] == pytest.approx((0.299 * 100 + 0.587 * 50 + 0.114 * 200) / 255)
 
 
+def test_clips_are_cut_from_the_part_of_a_recording_that_is_asked_for(dataset: Path, tmp_path: Path) -> None:
+    """Its light is known every 50 frames."""
+    scene = next(dataset.rglob("disk.h5"))
+    for first, count, frames in ((0, None, [50, 100, 150]), (60, None, [100, 150]), (30, 100, [50, 100])):
+        done = export_spikezoo([scene], tmp_path / f"{first}-{count}", frames=41, clips=9, first=first, count=count)
+        assert [clip.frame for clip in done] == frames
+    with pytest.raises(InputError, match="of 40 frames, none of known light has 20 before and after it"):
+        export_spikezoo([scene], tmp_path / "few", frames=41, first=60, count=40)
+    with pytest.raises(InputError, match=r"frames 150 to 210 asked of .*disk.h5, which holds 200"):
+        export_spikezoo([scene], tmp_path / "many", frames=41, first=150, count=60)
+
+
 def test_a_dataset_is_exported_with_its_splits_and_truths(dataset: Path, tmp_path: Path) -> None:
     done = export_spikezoo([dataset], tmp_path / "zoo", frames=81, clips=2)
     assert [f"{clip.split}/{clip.name}" for clip in done] == [

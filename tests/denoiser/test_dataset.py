@@ -16,7 +16,7 @@ from denoiser.dataset import SpikeWindows
 from denoiser.training.pairs import WARM_UP
 from spikecam_env.datasets import Plan, PlannedScene, build
 from spikecam_env.errors import InputError
-from spikecam_env.streams import isi_plane, read_recording
+from spikecam_env.streams import SpikeWriter, isi_plane, read_recording
 
 FRAMES = 200
 PLAN = Plan(
@@ -80,6 +80,39 @@ def test_the_whole_picture_without_a_crop(folder: Path) -> None:
     item = SpikeWindows(folder, "test", crop=None, reach=3)[0]
     assert item["spikes"].shape == (7, 32, 48) and item["clean_isi"].shape == (32, 48)
     assert (item["row"], item["column"], item["frame"]) == (0, 0, WARM_UP + 3)
+
+
+def test_files_of_several_sizes_and_lengths_are_one_data_set(tmp_path: Path) -> None:
+    """Every window of every file once, each equal to a reading of the file."""
+    rng = np.random.default_rng(0)
+    for name, shape in (("a.h5", (150, 16, 24)), ("b.h5", (170, 32, 16))):
+        with SpikeWriter(tmp_path / name, shape[1:], 40_000.0) as writer:
+            writer.append(*(rng.random((2, *shape)) < 0.3).astype(np.uint8))
+    files = [tmp_path / "a.h5", tmp_path / "b.h5"]
+    data = SpikeWindows(files, crop=(16, 16), stride=2)
+    items = [data[index] for index in range(len(data))]
+    expected = [(scene, t) for scene, frames in enumerate((150, 170)) for t in range(WARM_UP + 20, frames - 20, 2)]
+    assert [(item["scene"], item["frame"]) for item in items] == expected
+    for item in items[::7]:
+        path, t = files[item["scene"]], item["frame"]
+        crop = np.s_[item["row"] : item["row"] + 16, item["column"] : item["column"] + 16]
+        noisy, clean = (read_recording(path, stream=name).spikes for name in ("spikes", "clean"))
+        np.testing.assert_array_equal(item["spikes"], noisy[(np.s_[t - 20 : t + 21], *crop)])
+        np.testing.assert_array_equal(item["clean_isi"], isi_plane(clean, t, normalised=True)[crop])
+    assert len(SpikeWindows(files[0], crop=None)) == len(range(WARM_UP + 20, 130))
+    with pytest.raises(InputError, match="crop is None for recordings of several sizes"):
+        SpikeWindows(files, crop=None)
+    with pytest.raises(InputError, match=r"a.h5: crop \(32, 16\); it must be at most \(16, 24\)"):
+        SpikeWindows(files, crop=(32, 16))
+    with pytest.raises(InputError, match="no recordings are given"):
+        SpikeWindows([])
+
+
+def test_a_file_without_a_clean_twin_is_refused(tmp_path: Path) -> None:
+    with SpikeWriter(tmp_path / "a.h5", (16, 16), 40_000.0) as writer:
+        writer.append(np.zeros((150, 16, 16), np.uint8))
+    with pytest.raises(InputError, match=r"a.h5 holds no clean twin; make it with `spikecam film --clean`"):
+        SpikeWindows(tmp_path / "a.h5", crop=(8, 8))
 
 
 def test_datasets_that_will_not_do_are_refused(folder: Path, tmp_path: Path) -> None:

@@ -21,6 +21,7 @@ SMALL = {
     "play": "--film played.mp4 --episodes 1 --slow 4",
     "view": f"{SIZE} --frames 80 --save viewed.rrd",
     "dataset spift-n": f"{SIZE} --train 1 --test 1 --frames 320",
+    "dataset films": SIZE,
     "dataset phm-n": f"{SIZE} --scenes disk --frames 320",
     "campaign simulate": "--shape 16 16 --frames 400",
     "train": "--steps 2 --batch 2 --patch 32 --validate-every 2 --validate-passes 1",
@@ -72,6 +73,12 @@ def _recording(path: Path) -> None:
     path.write_bytes(np.packbits(spikes.reshape(128, -1), axis=1, bitorder="little").tobytes())
 
 
+def _films(folder: Path) -> None:
+    folder.mkdir()
+    for name in ("000", "001"):
+        np.save(folder / f"{name}.npy", np.random.default_rng(0).random((14, 32, 48), np.float32))
+
+
 def _campaign(folder: Path) -> None:
     levels = [word for level in ("0.1", "0.2", "0.4") for word in ("--recording", f"flat:radiance={level}")]
     simulate = ["campaign", "simulate", str(folder), "--shape", "16", "16", "--frames", "800"]
@@ -106,6 +113,7 @@ BROUGHT: dict[str, Callable[[Path], None]] = {
     "pictures": _pictures,
     "shots/times.csv": _times,
     "light.npy": _light,
+    "val_sharp": _films,
     "recording.dat": _recording,
     "wood.jpg": _picture,
     "kitchen.jpg": _picture,

@@ -156,6 +156,9 @@ WRITINGS: dict[str, Writing] = {
     "dataset": Writing(
         f"dataset phm-n --out {{out}} --frames 64 --scenes disk {' '.join(SMALL)}", "spift", {}, resumes=True
     ),
+    "dataset films": Writing(
+        f"dataset films {{films}} --out {{out}} --frames 64 {' '.join(SMALL)}", "cuts", {}, resumes=True
+    ),
     "train": Writing("train --out {out} --steps 1 --batch 1 --patch 16", "run", TRAINING, resumes=True),
     "train ssml": Writing(
         "train --mode ssml --out {out} --steps 1 --batch 1 --patch 16 --width 12", "run", TRAINING, resumes=True
@@ -193,11 +196,12 @@ WRITINGS: dict[str, Writing] = {
 
 
 def inputs_in(folder: Path) -> dict[str, Path]:
-    """A recording, the folder that it is in, a campaign of flats, a film, and a clip in Spike-Zoo's layout."""
+    """A recording, the folder that it is in, a campaign of flats, a film in a folder, a clip in Spike-Zoo's layout."""
     recordings = folder / "recordings"
     recordings.mkdir()
     made = {"recording": recordings / "disk.h5", "recordings": recordings, "campaign": folder / "campaign"}
-    made |= {"film": folder / "film.npy", "clips": folder / "clips"}
+    made |= {"film": folder / "films" / "film.npy", "clips": folder / "clips", "films": folder / "films"}
+    made["films"].mkdir()
     write_clip(made["clips"], "a", np.ones((64, 16, 24), np.uint8), np.ones((16, 24)))
     np.save(made["film"], np.random.default_rng(0).integers(0, 255, (9, 24, 40), dtype=np.uint8))
     assert run(["record", "--out", str(made["recording"]), "--frames", "64", "--truth-every", "16", *SMALL]) == 0

@@ -8,6 +8,7 @@ import json
 import os
 import tempfile
 from pathlib import Path
+from typing import Any
 
 import h5py
 import numpy as np
@@ -347,7 +348,7 @@ def test_a_malformed_h5_is_refused(recordings: Path, tmp_path: Path, meets) -> N
     each(h5_files(), check)
 
 
-DATASET = {
+DATASET: dict[str, Any] = {
     "format": "spikecam-dataset/1",
     "settings": {
         "package_version": "0",
@@ -367,12 +368,17 @@ DATASET = {
 }
 
 
-def test_a_malformed_manifest_is_refused_by_its_reader(tmp_path: Path) -> None:
+FILMS = {"film_rate_hz": 2000.0, "transfer": "linear", "interpolation": "linear", "white": 0.6}
+CUTS = {n: v for n, v in DATASET["settings"].items() if n not in ("mean_interval", "renderer")} | {"films": FILMS}
+
+
+@pytest.mark.parametrize("good", [DATASET, DATASET | {"settings": CUTS}], ids=["scenes", "films"])
+def test_a_malformed_manifest_is_refused_by_its_reader(good: dict, tmp_path: Path) -> None:
     def check(data: bytes) -> None:
         put(tmp_path / "dataset.json", data)
         reads_or_refuses("dataset.json", lambda: verify(tmp_path))
 
-    each(json_files(DATASET), check)
+    each(json_files(good), check)
 
 
 def test_a_malformed_manifest_is_refused(tmp_path: Path, meets) -> None:

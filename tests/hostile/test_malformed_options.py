@@ -86,6 +86,10 @@ COMMAND_LINES: dict[str, tuple[tuple[Any, ...], dict[str, tuple[Any, ...]]]] = {
             "--out": ("{here}/x", "{here}/x.avi", "{here}/none/x.h5"),
         },
     ),
+    "film clean": (
+        ("film", "{here}/film.npy", "--clean", "--film-rate", 1000, "--transfer", "linear", *SIZE_8),
+        {"--out": ("{here}/x", "{here}/x.npz", "{here}/x.dat", "{here}/none/x.h5")},
+    ),
     "demo": (
         ("demo", "--out", "{out}", *SIZE_8),
         {"--seed": SEEDS, "--frames": (*COUNTS, 499), "--size": SIZES, "--rpm": ("nan", "inf", "1e308")},
@@ -221,6 +225,20 @@ COMMAND_LINES: dict[str, tuple[tuple[Any, ...], dict[str, tuple[Any, ...]]]] = {
         ("dataset", "phm-n", "--out", "{out}", *SIZE_8, "--frames", 2),
         {"--seed": SEEDS, "--scenes": ("", "balls", "\x00")},
     ),
+    "dataset films": (
+        ("dataset", "films", "{films}", "--out", "{out}", *SIZE_8, "--frames", 2),
+        {
+            "--seed": SEEDS,
+            "--frames": (*COUNTS, 10**15, 10**4),
+            "--size": (*SIZES, (8, 41)),
+            "--truth-every": (-1, 10**30),
+            "--cuts": (*COUNTS, 10**6),
+            "--film-rate": (*FLOATS, "1e300", "None"),
+            "--transfer": ("", "srg", "PQ", "gamma0"),
+            "--white": (*FLOATS, "11"),
+            "--jobs": WORKERS,
+        },
+    ),
     "dataset verify": (("dataset", "verify", "{here}"), {"--jobs": WORKERS}),
     "denoise": (
         ("denoise", "{here}/a.dat", "--out", "{out}", "--height", 8, "--width", 8),
@@ -229,6 +247,9 @@ COMMAND_LINES: dict[str, tuple[tuple[Any, ...], dict[str, tuple[Any, ...]]]] = {
             "--height": COUNTS,
             "--width": (*COUNTS, 10**9),
             "--crop-width": (*COUNTS, 9),
+            "--first": (-1, 100, 10**30),
+            "--count": (*COUNTS, 10**9),
+            "--weights": ("{here}/none.pt", "{here}/a.dat", "", "\x00"),
         },
     ),
     "live": (
@@ -293,6 +314,7 @@ COMMAND_LINES: dict[str, tuple[tuple[Any, ...], dict[str, tuple[Any, ...]]]] = {
             "--channels": ((0, 0, 0), (257, 1, 1)),
             "--width": (12,),
             "--frames-a-step": (12,),
+            "--recordings": ("{here}/none.h5", "{here}/a.dat", "{here}", "", "\x00"),
             "--no-refine": ((),),
         },
     ),
@@ -352,7 +374,7 @@ COMMAND_LINES: dict[str, tuple[tuple[Any, ...], dict[str, tuple[Any, ...]]]] = {
     ),
     "evaluate spikezoo": (
         ("evaluate", "spikezoo", "{here}", "--out", "{out}"),
-        {"--rate": FLOATS, "--best": ("{here}/a.dat",)},
+        {"--rate": FLOATS, "--best": ("{here}/a.dat",), "--jobs": WORKERS},
     ),
     "evaluate tasks": (
         ("evaluate", "tasks", "--json", "{out}.json", "--tasks", "Catch-v1", "--episodes", 1),
@@ -388,6 +410,8 @@ COMMAND_LINES: dict[str, tuple[tuple[Any, ...], dict[str, tuple[Any, ...]]]] = {
         {
             "--frames": (*COUNTS, 300),
             "--clips": COUNTS,
+            "--first": (-1, 10**30),
+            "--count": COUNTS,
             "--rate": FLOATS,
             "--out": ("{here}/none/x", "{here}/a.dat"),
         },
@@ -409,7 +433,9 @@ def test_an_option_out_of_range_is_refused_by_name(name: str, tmp_path: Path, me
     """Of a command every option in turn, with every value of the table; values that are not refused are named."""
     (tmp_path / "a.dat").write_bytes(bytes(range(256)) * 2)
     np.save(tmp_path / "film.npy", np.full((5, 8, 8), 100, np.uint8))
-    places = {"here": tmp_path, "out": tmp_path / "out"}
+    (tmp_path / "films").mkdir()
+    np.save(tmp_path / "films" / "film.npy", np.full((5, 8, 8), 100, np.uint8))
+    places = {"here": tmp_path, "out": tmp_path / "out", "films": tmp_path / "films"}
 
     def refused(words: list[Any]) -> None:
         assert meets(f"options of {name}", *(_filled(word, places) for word in words)) == 2
