@@ -151,6 +151,16 @@ class Dimmable(Scene, Protocol):
         ...
 
 
+@runtime_checkable
+class Displacing(Scene, Protocol):
+    """A scene that knows the way of its points exactly, those that get covered too."""
+
+    def displacement(self, frame: float, by: float, gaze: Gaze | None = None) -> Pictures:
+        """(H, W, 2) float32: way of the point seen in each pixel, from `frame` to `by` frames later [pixels], x then
+        y."""
+        ...
+
+
 class Derived:
     """Base of a scene made of `scene`, whose light it shows in its own way; size and frame rate are the same."""
 

@@ -32,6 +32,8 @@ class DatasetOptions:
     """Frames between ground truths (radiance, flow, object number, depth, poses); 0: none."""
     mean_interval: float = 10.0
     """Exposure: frames between spikes, on average over the picture."""
+    pan: tuple[float, float] = (0.0, 0.0)
+    """Speed of the camera's gaze to the right and down [pixels/frame]; then everything moves."""
     renderer: Literal["auto", "egl-hardware", "egl-software", "osmesa", "embree"] = "auto"
     """Back-end that draws; auto: the best that works here, and the same one when a run is continued."""
     camera: CameraOptions = field(default_factory=CameraOptions)
@@ -50,6 +52,7 @@ class DatasetOptions:
             "mean_interval": self.mean_interval,
             "model": self.camera.load(),
             "renderer": self.renderer,
+            "pan": self.pan,
         }
 
     def make(self, plan: Plan) -> None:
