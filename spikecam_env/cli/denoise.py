@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, Literal
 
 import tyro
 
-from spikecam_env.cli.mode_weights import Mode
+from spikecam_env.cli.mode_weights import Brightness, Mode, brightness_for
 from spikecam_env.cli.reading import ReadingOptions
 from spikecam_env.numbers import Count
 
@@ -45,6 +45,9 @@ class Denoise:
     """Not for `paper`: passes that overlap by half: less error, no seams, twice the time."""
     calibration: Path | None = None
     """Not for `paper`: maps.h5 of `spikecam calibrate`, or its folder: the camera's fixed pattern is then taken out."""
+    brightness: Brightness = 1.0
+    """Spikes are made of rates times this, 0.01 to 100, for networks that read spikes in dim light.  auto: the factor
+    that brings the mean to 0.1 spikes a frame, or a smaller one at which less than 1 % of the pixels saturate."""
     film: bool = True
     """Also write film.mp4, noisy beside denoised: at most 240 pictures, evenly over the recording."""
     reading: ReadingOptions = field(default_factory=ReadingOptions)
@@ -62,9 +65,13 @@ class Denoise:
             self._write_pictures(folder, found)
             rows, speed = found.rows(), found.speed()
             summary = {"file": str(self.file), "mode": self.mode, "window": found.window, "speed": speed, "rows": rows}
+            summary |= {"brightness": found.brightness, "saturated": found.saturated}
             write_json(folder / "summary.json", summary)
             written = sorted(path.name for path in folder.iterdir())
         print(table(rows))
+        if found.brightness != 1.0:
+            cut = f"{100 * found.saturated:.2g} % of them saturate"
+            print(f"denoised.h5: spikes {found.brightness:g} times brighter than the light; {cut}")
         print()
         print(table([speed]))
         print(f"wrote {', '.join(written)} in {self.out}")
@@ -84,17 +91,31 @@ class Denoise:
         window = checked_window(self.window, len(noisy))
         light = light_at(self.file, whole_windows(len(noisy), window), noisy.shape[1:])
         options: dict[str, Any] = {"overlap": self.overlap, "unit": self.calibration, "engine": self.engine}
+        options["brightness"] = brightness_for(self.brightness, noisy)
         online = OnlineDnSS.pretrained(self.mode, output="both", **options)
         denoised, planes, seconds = restore(noisy, online, [*picture_frames(len(noisy), window), *light])
         return DenoisedRecording(
-            noisy, denoised, planes, light, window, recording.frame_rate_hz, seconds, online.latency
+            noisy,
+            denoised,
+            planes,
+            light,
+            window,
+            recording.frame_rate_hz,
+            seconds,
+            online.latency,
+            recorded=recording.brightness,
+            brightness=online.brightness,
+            saturated=online.saturated,
         )
 
     def _write_stream(self, folder: Path, recording: Recording, found: DenoisedRecording) -> None:
         from spikecam_env.streams import SpikeWriter
+        from spikecam_env.streams.recording import BRIGHTNESS
 
         attributes = {k: v for k, v in recording.attributes.items() if k in ("model", "seed", "scene")}
         attributes |= {"denoiser": self.mode, "source": self.file.name}
+        if (brightness := recording.brightness * found.brightness) != 1.0:
+            attributes |= {BRIGHTNESS: brightness, "saturated": found.saturated}
         shape = found.denoised.shape[1:]
         with SpikeWriter(folder / "denoised.h5", shape, recording.frame_rate_hz, **attributes) as writer:
             writer.append(found.denoised)
