@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 from matplotlib import font_manager
@@ -36,13 +37,26 @@ def save_pictures(
         _save(_file(folder, case, LIGHT, LIGHT), display(truth, exposed.white))
 
 
+class Panel(NamedTuple):
+    """A picture of a strip."""
+
+    file: Path
+    title: str
+    line: str
+    """Under the title."""
+
+
 def write_page(
     path: Path, folder: Path, cases: Sequence[StreamCase], rows: Sequence[str], records: Sequence[RowResult]
 ) -> None:
     """Strips of the scenes whose pictures are in `folder`; no page where there are none."""
     first = {case.scene: case for case in reversed(cases)}
-    strips = [_strip(folder, first[scene], rows, records) for scene in reversed(first)]
-    made = [strip for strip in strips if strip is not None]
+    write_strips(path, [_panels(folder, first[scene], rows, records) for scene in reversed(first)])
+
+
+def write_strips(path: Path, strips: Sequence[Sequence[Panel]]) -> None:
+    """A page of strips of those panels whose files there are; no page where there are none."""
+    made = [strip for panels in strips if (strip := _strip(panels)) is not None]
     if not made:
         return
     width, height = max(s.width for s in made), sum(s.height for s in made)
@@ -55,23 +69,25 @@ def write_page(
         whole.save(beside)
 
 
-def _strip(folder: Path, case: StreamCase, rows: Sequence[str], records: Sequence[RowResult]) -> Image.Image | None:
-    panels = [(row, COLUMN) for row in STRIP if row in rows]
-    panels += [(row, PLANE) for row in rows if ROWS[row].shows_planes]
-    panels.append((LIGHT, LIGHT))
-    shown = [(row, column, _file(folder, case, row, column)) for row, column in panels]
-    pictures = [(row, column, Image.open(path)) for row, column, path in shown if path.is_file()]
+def _panels(folder: Path, case: StreamCase, rows: Sequence[str], records: Sequence[RowResult]) -> list[Panel]:
+    names = [(row, COLUMN) for row in STRIP if row in rows]
+    names += [(row, PLANE) for row in rows if ROWS[row].shows_planes]
+    names.append((LIGHT, LIGHT))
+    return [Panel(_file(folder, case, row, column), *_caption(case, row, column, records)) for row, column in names]
+
+
+def _strip(panels: Sequence[Panel]) -> Image.Image | None:
+    pictures = [(panel, Image.open(panel.file)) for panel in panels if panel.file.is_file()]
     if not pictures:
         return None
-    w, h = WIDE, round(WIDE / pictures[0][2].width * pictures[0][2].height)
+    w, h = WIDE, round(WIDE / pictures[0][1].width * pictures[0][1].height)
     strip = Image.new("RGB", (len(pictures) * (w + MARGIN) + MARGIN, h + MARGIN + CAPTION), BACKGROUND)
     draw = ImageDraw.Draw(strip)
-    for i, (row, column, picture) in enumerate(pictures):
+    for i, (panel, picture) in enumerate(pictures):
         x = MARGIN + i * (w + MARGIN)
         strip.paste(picture.resize((w, h), Image.Resampling.LANCZOS).convert("RGB"), (x, MARGIN))
-        title, line = _caption(case, row, column, records)
-        draw.text((x, MARGIN + h + 3), title, INK, _font(12))
-        draw.text((x, MARGIN + h + 18), line, FAINT, _font(11))
+        draw.text((x, MARGIN + h + 3), panel.title, INK, _font(12))
+        draw.text((x, MARGIN + h + 18), panel.line, FAINT, _font(11))
     return strip
 
 

@@ -199,7 +199,7 @@ def cases_of(table: Table, request: TableRequest) -> tuple[list[StreamCase], dic
             interval,
             speed,
             pan=pan,
-        )  # fmt: skip
+        )
         for interval, speed, scene, seed in product(
             request.intervals, request.speeds, request.scenes, range(request.seeds)
         )
