@@ -22,7 +22,7 @@ from torch import nn
 from tqdm import tqdm
 
 from denoiser.decoders import accumulate, mus
-from denoiser.decoders.brightness import checked_brightness, saturating
+from denoiser.decoders.brightness import brightened, checked_brightness, saturating
 from denoiser.passes.crossfade import Crossfade
 from denoiser.passes.engine import Engine
 from denoiser.passes.infer import on_host
@@ -326,7 +326,7 @@ class OnlineDnSS:
 
     def _fired(self, rate: Pictures) -> Spikes:
         """Spikes of more rates."""
-        bright = rate if self._brightness == 1.0 else rate * np.float32(self._brightness)
+        bright = brightened(rate, self._brightness)
         self._made += rate.size
         self._cut += saturating(rate, self._brightness)
         fired, self._decoding = _DECODERS[str(self._decoder)].step(bright, self._decoding)

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from denoiser.decoders import accumulate
+from denoiser.decoders.brightness import brightened
 from denoiser.online import OnlineDnSS
 from denoiser.passes.recipe import MODES
 from spikecam_env.errors import InputError, NotReadyError, unknown_name
@@ -121,8 +122,8 @@ class DenoiseObservation(gymnasium.Wrapper, gymnasium.utils.RecordConstructorArg
         if self._type == np.float32:
             return np.repeat(block.mean(axis=0, dtype=np.float32)[None], count, axis=0)
         if self._open().brightness != 1.0:
-            bright = np.repeat(block.mean(axis=0, dtype=np.float32)[None] * self._open().brightness, count, axis=0)
-            return accumulate.step(bright, accumulate.start(block.shape[1:]))[0].astype(self._type)
+            bright = brightened(block.mean(axis=0, dtype=np.float32)[None], self._open().brightness)
+            return accumulate.step(np.repeat(bright, count, axis=0), accumulate.start(block.shape[1:]))[0]
         return block[np.arange(count) % len(block)].astype(self._type)
 
     def _with_latency(self, info: dict[str, Any], frames: int) -> dict[str, Any]:

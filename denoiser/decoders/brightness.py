@@ -9,10 +9,9 @@ factor.  A stream of few spikes starves a network that was trained on more: docs
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from spikecam_env.checked import checked_number
-from spikecam_env.types import Spikes
+from spikecam_env.types import Pictures, Spikes
 
 BOUNDS = (0.01, 100.0)
 """Least and greatest factor: a rate of a spike in 100 frames becomes one in every frame, or the other way round."""
@@ -61,7 +60,12 @@ def automatic(spikes: Spikes) -> float:
     return max(1.0, float(np.floor(10 * factor + 1e-6)) / 10)
 
 
-def saturating(rates: NDArray[np.floating], brightness: float) -> int:
+def brightened(rates: Pictures, brightness: float) -> Pictures:
+    """Rates times a brightness; the same array where that is 1."""
+    return rates if brightness == 1.0 else rates * np.float32(brightness)
+
+
+def saturating(rates: Pictures, brightness: float) -> int:
     """How many rates are cut, since they ask for more than one spike a frame.
 
     Example:

@@ -26,6 +26,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from denoiser.decoders import accumulate, held, mus
+from denoiser.decoders.brightness import brightened
 from denoiser.evaluate.case import ExposedStreams, Planes, StreamCase
 from denoiser.evaluate.held_out import calibrated
 from denoiser.ground.plain_torch import read_plain
@@ -181,7 +182,7 @@ def streams(
     return [
         RowStreams(
             row,
-            decoded(planes * np.float32(ROWS[row].brightness), ROWS[row].decoder),
+            decoded(brightened(planes, ROWS[row].brightness), ROWS[row].decoder),
             planes if ROWS[row].shows_planes else None,
         )
         for row in rows
