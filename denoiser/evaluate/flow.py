@@ -207,20 +207,28 @@ def _mean_errors(found: Sequence[Pictures], true: Sequence[Pictures], dt: int) -
 def _entered(case: StreamCase, folder: Path, pictures: Path | None) -> ScoredPictures:
     """The record of a case whose flows are files of another program."""
     scores: dict[str, dict[str, float | None]] = {}
-    for dt in INTERVALS:
+    for dt, found in _flows_in(folder, case).items():
         true = _true(case, dt)
-        files = [flow_file(folder, case.scene, dt, number) for number in range(len(true))]
-        if not files[0].parent.is_dir():
-            continue
-        found = [read_flo(file, case.shape) for file in files]
         scores[named(ENTERED, dt)] = _mean_errors(found, true, dt)
         if pictures is not None and dt == DRAWN:
             save_flow(pictures, case, folder.name, ENTERED, found[len(found) // 2], true[len(true) // 2])
-    if not scores:
-        folders = " and ".join(str(flow_file(folder, case.scene, dt, 0).parent) for dt in INTERVALS)
-        raise InputError(f"{folder} has no flow of {case.scene}; it needs a folder {folders}, or one of them")
     of: dict[str, Any] = {name: getattr(case, name) for name in ("scene", "seed", "interval", "speed")}
     return ScoredPictures(**of, row=folder.name, weights={}, pictures=scores)
+
+
+def _flows_in(folder: Path, case: StreamCase) -> dict[int, list[Pictures]]:
+    """Flows of a case by their frames, as another program wrote them; InputError where there are none, or not all."""
+    places = {dt: flow_file(folder, case.scene, dt, 0).parent for dt in INTERVALS}
+    if not any(place.is_dir() for place in places.values()):
+        raise InputError(f"{folder} has no flow of {case.scene}; it needs {' or '.join(map(str, places.values()))}")
+    return {
+        dt: [
+            read_flo(flow_file(folder, case.scene, dt, number), case.shape)
+            for number in range(len(first_frames(case.frames, dt)))
+        ]
+        for dt, place in places.items()
+        if place.is_dir()
+    }
 
 
 def _check(cases: Sequence[StreamCase], rows: Sequence[str], flows: Sequence[Path]) -> None:
@@ -238,3 +246,5 @@ def _check(cases: Sequence[StreamCase], rows: Sequence[str], flows: Sequence[Pat
     for found in flows:
         if not found.is_dir():
             raise InputError(f"--flows {found}: there is no such folder")
+        for case in cases:
+            _flows_in(found, case)

@@ -132,7 +132,7 @@ def test_what_cannot_be_exported_is_refused_in_a_line_with_nothing_left(dataset:
         error = capsys.readouterr().err
         assert message in error and len(said(error)) == 1, error
         assert not out.exists()
-    with pytest.raises(InputError, match="are named 'test/disk'"):
+    with pytest.raises(InputError, match="are named 'train/0'"):
         export_scflow([dataset, dataset], out)
     out.mkdir()
     (out / "mine").touch()
