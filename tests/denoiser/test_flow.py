@@ -149,6 +149,16 @@ def test_flows_of_another_program_are_rows_under_their_folders_names(
     assert near["noisy", "no motion"]["all"] == near["noisy", "no motion"]["moving"] > 3  # the camera moves by 3
 
 
+def test_a_simulated_case_has_the_scores_of_the_dataset_with_the_same_settings(dataset: Path) -> None:
+    """Before a camera that moves, too."""
+    stored = evaluate_flow(TableRequest(scenes=("disk",), data=dataset, rows=("noisy", "clean")))
+    request = TableRequest(
+        scenes=("disk",), shape=(48, 80), frames=200, seeds=1, rows=("noisy", "clean"), pan=(0.3, 0.0)
+    )
+    assert evaluate_flow(request)["groups"] == stored["groups"]
+    assert "gaze moving by 0.3, 0 pixels a frame" in flow_report(stored)
+
+
 def test_nonsense_is_refused_in_a_line(dataset: Path, truth: Path, tmp_path: Path, capsys) -> None:
     empty, small, cut, noisy = (tmp_path / name for name in ("empty", "small", "cut", "noisy"))
     empty.mkdir()
