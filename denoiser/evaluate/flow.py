@@ -11,6 +11,7 @@ Source of DIS: Kroeger et al., ECCV 2016, as cv2.DISOpticalFlow, preset MEDIUM.
 
 from __future__ import annotations
 
+import os
 from collections.abc import Mapping, Sequence
 from contextlib import nullcontext
 from dataclasses import dataclass, field
@@ -96,7 +97,7 @@ def evaluate_flow(
                 records += [_entered(case, found, pictures) for case in cases]
         result = {
             "title": FLOW_TABLE.title,
-            "rows": [*rows, *(found.name for found in flows)],
+            "rows": [*rows, *map(_row_of, flows)],
             "settings": {
                 "shapes": [list(shape) for shape in dict.fromkeys(case.shape for case in cases)],
                 "frames": list(dict.fromkeys(case.frames for case in cases)),
@@ -211,9 +212,14 @@ def _entered(case: StreamCase, folder: Path, pictures: Path | None) -> ScoredPic
         true = _true(case, dt)
         scores[named(ENTERED, dt)] = _mean_errors(found, true, dt)
         if pictures is not None and dt == DRAWN:
-            save_flow(pictures, case, folder.name, ENTERED, found[len(found) // 2], true[len(true) // 2])
+            save_flow(pictures, case, _row_of(folder), ENTERED, found[len(found) // 2], true[len(true) // 2])
     of: dict[str, Any] = {name: getattr(case, name) for name in ("scene", "seed", "interval", "speed")}
-    return ScoredPictures(**of, row=folder.name, weights={}, pictures=scores)
+    return ScoredPictures(**of, row=_row_of(folder), weights={}, pictures=scores)
+
+
+def _row_of(folder: Path) -> str:
+    """Name of the row of a folder of flows: its own, of "." too."""
+    return os.path.basename(os.path.abspath(folder)) or "flows"
 
 
 def _flows_in(folder: Path, case: StreamCase) -> dict[int, list[Pictures]]:
@@ -240,7 +246,7 @@ def _check(cases: Sequence[StreamCase], rows: Sequence[str], flows: Sequence[Pat
             raise InputError(f"pictures of {case.shape[0]} x {case.shape[1]}; DIS needs {LEAST_SIDE} x {LEAST_SIDE}")
         if not all(first_frames(case.frames, dt) for dt in INTERVALS):
             raise InputError(f"{case.scene} has {case.frames} frames; flow over {INTERVALS[-1]} frames needs more")
-    distinct((*rows, *(found.name for found in flows)), "row")
+    distinct((*rows, *map(_row_of, flows)), "row")
     if flows and len({(case.seed, case.interval, case.speed) for case in cases}) > 1:
         raise InputError("--flows are of one camera, interval and speed; give one of --seeds, --intervals and --speeds")
     for found in flows:
