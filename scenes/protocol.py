@@ -153,11 +153,11 @@ class Dimmable(Scene, Protocol):
 
 @runtime_checkable
 class Displacing(Scene, Protocol):
-    """A scene that knows the way of its points exactly, those that get covered too."""
+    """A scene that knows exactly where its points go, those that get covered too."""
 
     def displacement(self, frame: float, by: float, gaze: Gaze | None = None) -> Pictures:
-        """(H, W, 2) float32: way of the point seen in each pixel, from `frame` to `by` frames later [pixels], x then
-        y."""
+        """(H, W, 2) float32: displacement of the point seen in each pixel, in the `by` frames after `frame` [pixels], x
+        then y."""
         ...
 
 

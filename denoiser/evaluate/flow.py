@@ -1,6 +1,6 @@
 """Optical flow from streams: the error of OpenCV's DIS between two pictures of a row, and of flows that others found.
 
-    picture at frame t, picture at t + dt  ->  DIS  ->  flow (H, W, 2)     against the way of what is seen, in dt frames
+    picture at frame t, picture at t + dt  ->  DIS  ->  flow (H, W, 2)     against the true one
 
 Pictures are TFP 21 and 41 of a row's spikes, and its rate planes.  dt is 10 and 20 frames, and t goes on by dt, as
 SCFlow's windows do (`spikecam_env.datasets.scflow`).  The error of a pixel is the distance of its end point from the
@@ -31,7 +31,7 @@ from denoiser.evaluate.rows import ROWS, RowStreams, why_not
 from denoiser.evaluate.tables import Table, TableRequest, cases_of, check_memory, rows_of, settings_of
 from denoiser.evaluate.work import Kind, WorkItem, evaluated, results_in
 from scenes.derived.faster import MOVES
-from spikecam_env.datasets.export import ways
+from spikecam_env.datasets.export import true_flows
 from spikecam_env.datasets.scflow import INTERVALS, first_frames, flow_file, read_flo
 from spikecam_env.errors import InputError
 from spikecam_env.names import distinct
@@ -56,9 +56,9 @@ METHODS = ("noisy", "fast", "best", "best-bright", "clean")
 
 @dataclass(frozen=True)
 class ExposedFlow(ExposedStreams):
-    """A case's streams and the true ways (H, W, 2) [pixels] by their frames, from each pair's first frame."""
+    """A case's streams and the true flows (H, W, 2) [pixels] by their frames, from each pair's first frame."""
 
-    ways: Mapping[int, Sequence[Pictures]] = field(default_factory=dict)
+    true: Mapping[int, Sequence[Pictures]] = field(default_factory=dict)
 
 
 def evaluate_flow(
@@ -154,20 +154,20 @@ def _expose(case: StreamCase) -> ExposedFlow:
     last = max(starts[-1] + dt for dt in INTERVALS if (starts := first_frames(case.frames, dt)))
     reach = max(WINDOWS) // 2
     first, stop = first_frames(case.frames, INTERVALS[0])[0] - reach, last + reach + 1
-    true = {dt: ways(scene, case.frames, dt) for dt in INTERVALS}
+    true = {dt: true_flows(scene, case.frames, dt) for dt in INTERVALS}
     return ExposedFlow(noisy, clean, None, first, stop, (first + stop) // 2, 1.0, true)
 
 
 @lru_cache(maxsize=16)
 def _true(case: StreamCase, frames: int) -> Sequence[Pictures]:
-    return ways(phm.scene_of(case), case.frames, frames)
+    return true_flows(phm.scene_of(case), case.frames, frames)
 
 
 def _judged(item: WorkItem[ScoredPictures], made: RowStreams, exposed: ExposedStreams) -> dict[str, Any]:
     """The mean errors of all pairs, of pictures of the spikes and of the rate planes."""
     assert isinstance(exposed, ExposedFlow)
     scores: dict[str, dict[str, float | None]] = {}
-    for dt, true in exposed.ways.items():
+    for dt, true in exposed.true.items():
         frames = first_frames(item.case.frames, dt)
         for picture in _pictures_of(made):
             found = [
@@ -177,7 +177,7 @@ def _judged(item: WorkItem[ScoredPictures], made: RowStreams, exposed: ExposedSt
             if item.pictures is not None and dt == DRAWN:
                 save_flow(item.pictures, item.case, made.row, picture, found[len(found) // 2], true[len(true) // 2])
         if made.row == "noisy":
-            scores[named(STILL, dt)] = _mean_errors([np.zeros_like(way) for way in true], true, dt)
+            scores[named(STILL, dt)] = _mean_errors([np.zeros_like(flow) for flow in true], true, dt)
     return {"pictures": scores}
 
 
@@ -200,7 +200,7 @@ def _picture(made: RowStreams, picture: str, at: int) -> Planes:
 
 def _mean_errors(found: Sequence[Pictures], true: Sequence[Pictures], dt: int) -> dict[str, float | None]:
     """Means over the pairs; of moving pixels over the pairs in which something moves."""
-    errors = [end_point_errors(flow, way, dt) for flow, way in zip(found, true, strict=True)]
+    errors = [end_point_errors(flow, its, dt) for flow, its in zip(found, true, strict=True)]
     known = {name: [e for error in errors if (e := error[name]) is not None] for name in MEASURES}
     return {name: plain(float(np.mean(values))) if values else None for name, values in known.items()}
 

@@ -20,24 +20,24 @@ from spikecam_env.types import Pictures
 from spikecam_env.whole import whole_file
 
 FULL = 99.0
-"""Percentile of the true way that has the full colour."""
+"""Percentile of the lengths of the true flow that has the full colour."""
 SHORTEST = 0.5
-"""Way [pixels] that has the full colour at least: less is noise of every method."""
+"""Shortest length [pixels] that has the full colour: less is noise of every method."""
 TRUE = "true"
 """Name of the picture of the true flow."""
 
 
 def drawn(flow: Pictures, farthest: float) -> np.ndarray:
-    """(H, W, 3) uint8 picture of a flow (H, W, 2); ways of `farthest` pixels and more have the full colour.
+    """(H, W, 3) uint8 picture of a flow (H, W, 2); `farthest` pixels and more have the full colour.
 
     Example:
         >>> drawn(np.array([[[0.0, 0.0], [2.0, 0.0]]]), 2.0).tolist()
         [[[255, 255, 255], [255, 0, 0]]]
     """
-    way = np.linalg.norm(flow, axis=-1)
+    length = np.linalg.norm(flow, axis=-1)
     turn = np.degrees(np.arctan2(flow[..., 1], flow[..., 0])) % 360
-    strength = np.clip(way / farthest, 0, 1)
-    hsv = np.stack([turn, strength, np.ones_like(way)], axis=-1).astype(np.float32)
+    strength = np.clip(length / farthest, 0, 1)
+    hsv = np.stack([turn, strength, np.ones_like(length)], axis=-1).astype(np.float32)
     return np.asarray(np.rint(255 * cv2.cvtColor(hsv, cv2.COLOR_HSV2RGB)), np.uint8)
 
 

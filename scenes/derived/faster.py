@@ -54,7 +54,7 @@ class Faster(Derived):
         return dataclasses.replace(truth, flow=truth.flow * np.float32(self.factor))
 
     def displacement(self, frame: float, by: float, gaze: Gaze | None = None) -> Pictures:
-        """The way of the scene's points in as many of its own frames."""
+        """The displacement of the scene's points in as many of its own frames."""
         _refuse(gaze)
         return displacement(self.scene, frame * self.factor, by * self.factor)
 

@@ -71,7 +71,7 @@ def check_flow(scene: Scene, frame: float = 100, frames: int = 40, gaze: Gaze | 
 
 
 def displacement(scene: Scene, frame: float, by: float, gaze: Gaze | None = None) -> Pictures:
-    """Way of the point seen in each pixel, from a frame to `by` frames later.
+    """Displacement of the point seen in each pixel, in the `by` frames after a frame.
 
     Args:
         scene: one that does not know it (`Displacing`) has its points carried along its flow, `STEP` frames at a time;

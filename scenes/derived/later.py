@@ -32,7 +32,7 @@ class Later(Derived):
         return self.scene.truth(frame + self.frames, self._gaze_of_scene(gaze))
 
     def displacement(self, frame: float, by: float, gaze: Gaze | None = None) -> Pictures:
-        """The way of the scene's points, the camera's own motion in it."""
+        """The displacement of the scene's points, the camera's own motion in it."""
         return displacement(self.scene, frame + self.frames, by, self._gaze_of_scene(gaze))
 
     def places(self, frame: float, gaze: Gaze | None = None) -> dict[str, tuple[float, float]]:

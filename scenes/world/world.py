@@ -96,7 +96,7 @@ class World(WorldSpec):
         return truth_at(self, self.cache, self.plan(int(frame // BLOCK)), frame, gaze)
 
     def displacement(self, frame: float, by: float, gaze: Gaze | None = None) -> Pictures:
-        """(H, W, 2) way of the point seen in each pixel, see `scenes.protocol.Displacing`."""
+        """(H, W, 2) displacement of the point seen in each pixel, see `scenes.protocol.Displacing`."""
         return displacement_at(self, self.cache, self.plan(int(frame // BLOCK)), frame, by, gaze)
 
     def picture(self, frame: float, gaze: Gaze | None = None, rays: int = TRUTH_RAYS) -> Pictures:

@@ -24,8 +24,8 @@ class Export:
     Spike-Zoo's are.  White of the picture is light 0.6 (spikes a frame), by which Spike-Zoo divides; brighter pixels
     are cut, and the table says how many.
 
-    scflow: windows of 25 frames, 10 and 20 frames apart, as test/SCENE/encoding25_dt10/*.npy, and the way of what is
-    seen from each to the next, as test/SCENE/dt=10/motion_vector/*.flo.
+    scflow: windows of 25 frames, 10 and 20 frames apart, as test/SCENE/encoding25_dt10/*.npy.  The optical flow from
+    each to the next is test/SCENE/dt=10/motion_vector/*.flo.
 
     example:  spikecam export phm --out phm-zoo
               spikecam evaluate spikezoo phm-zoo
@@ -103,7 +103,7 @@ class Export:
                 "frames apart": scene.interval,
                 "windows": scene.windows,
                 "spikes/frame": scene.rate,
-                "mean way [pixels]": scene.way,
+                "mean flow [pixels]": scene.flow,
             }
             for scene in done
         ]

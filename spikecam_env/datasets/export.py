@@ -1,8 +1,8 @@
 """Recordings with ground truth in the layout of others, for their networks.
 
 Spike-Zoo   a clip is cut out about a frame whose light is known: `frames` frames, the known one in the middle
-SCFlow      windows from end to end, and the way of what is seen from each to the next: scenes of datasets are made
-            again for it
+SCFlow      windows from end to end, and the optical flow from each to the next: scenes of datasets are made again for
+            it
 
 Either takes the noisy stream, the clean twin's, or that of a denoiser.
 """
@@ -133,8 +133,8 @@ class ExportedWindows:
     windows: int
     rate: float
     """Mean spikes a frame and pixel."""
-    way: float
-    """Mean way of all pixels from a window to the next [pixels]."""
+    flow: float
+    """Mean length of the flow from a window to the next [pixels]."""
     denoiser: dict[str, Any] = field(default_factory=dict)
     """How the stream was denoised; empty where it was not."""
 
@@ -151,7 +151,7 @@ def export_scflow(
     """Write SCFlow's layout (`datasets.scflow`) from folders of datasets, a folder of scenes for each split.
 
     Args:
-        sources: folders of datasets: their scenes are made again, to follow what is seen from window to window.
+        sources: folders of datasets: their scenes are made again, for the flow from window to window.
         out: a new folder, which appears whole: test/, train/ and `export.json`.
         intervals: frames from a window to the next.
         stream: "spikes", or "clean" for the noise-free twin's.
@@ -175,18 +175,18 @@ def export_scflow(
             scene = scene_again()
             for interval in intervals:
                 windows = write_windows(folder / split, path.stem, interval, spikes)
-                flows = ways(scene, len(spikes), interval)
+                flows = true_flows(scene, len(spikes), interval)
                 write_flows(folder / split, path.stem, interval, flows)
-                rate, way = float(spikes.mean()), float(np.linalg.norm(np.stack(flows), axis=-1).mean())
+                rate, mean = float(spikes.mean()), float(np.linalg.norm(np.stack(flows), axis=-1).mean())
                 name = scene_folder(path.stem)
-                done.append(ExportedWindows(split, name, path.name, interval, windows, rate, way, how))
+                done.append(ExportedWindows(split, name, path.name, interval, windows, rate, mean, how))
         record = {"layout": "scflow", "stream": stream, "scenes": [asdict(scene) for scene in done]}
         write_text_whole(folder / RECORD, json.dumps(record, indent=1) + "\n")
     return done
 
 
-def ways(scene: Scene, frames: int, interval: int) -> list[Pictures]:
-    """Ways (H, W, 2) [pixels] from each window of a recording of so many frames to the next, middle to middle."""
+def true_flows(scene: Scene, frames: int, interval: int) -> list[Pictures]:
+    """Flows (H, W, 2) [pixels] from each window of a recording of so many frames to the next, middle to middle."""
     return [displacement(scene, frame + 0.5, interval) for frame in first_frames(frames, interval)]
 
 
@@ -200,7 +200,7 @@ def _scenes(source: Path) -> Iterator[tuple[str, Path, Callable[[], Scene]]]:
 
 
 def _check_room(spikes: Spikes, intervals: Sequence[int], out: str | Path, name: str) -> None:
-    """InputError where the disk has no room for the windows and ways of a recording."""
+    """InputError where the disk has no room for the windows and flows of a recording."""
     pixels = spikes[0].size
     size = sum(len(first_frames(len(spikes), interval)) * pixels * (2 * REACH + 1 + 8) for interval in intervals)
     checked_disk(size, out, f"windows of {name}")

@@ -1,8 +1,8 @@
-"""SCFlow's layout: windows of spikes, and the way of what is seen from each to the next.
+"""SCFlow's layout: windows of spikes, and the optical flow from each to the next.
 
     <folder>/SCENE/encoding25_dt10/N.npy             (25, H, W) uint8, the 12 frames before and after a frame, upright
-    <folder>/SCENE/dt=10/motion_vector/NNNN.flo      (H, W, 2) float32 [pixels], x to the right, then y down: the way of
-                                                     the point seen in each pixel from window N to window N + 1
+    <folder>/SCENE/dt=10/motion_vector/NNNN.flo      (H, W, 2) float32 [pixels], x to the right, then y down: how far
+                                                     the point in each pixel goes from window N to N + 1
 
 and the same of dt=20.  Its loader counts the windows from 0, and takes the truth of all but the last.  The middles of
 windows are dt frames apart.  Spikes and truth are upright: its loader turns neither.
@@ -56,7 +56,7 @@ def scene_folder(name: str) -> str:
 
 
 def first_frames(frames: int, interval: int) -> range:
-    """Middles of the windows from which a way goes to the next, of a recording of so many frames.
+    """Middles of the windows that have a next one, of a recording of so many frames.
 
     Example:
         >>> list(first_frames(200, 20))
@@ -71,7 +71,7 @@ def windows_file(folder: Path, scene: str, interval: int, number: int) -> Path:
 
 
 def flow_file(folder: Path, scene: str, interval: int, number: int) -> Path:
-    """Where the way from a window to the next is."""
+    """Where the flow from a window to the next is."""
     return folder / scene_folder(scene) / f"dt={interval}" / "motion_vector" / f"{number:04d}.flo"
 
 
@@ -102,7 +102,7 @@ def write_windows(folder: Path, scene: str, interval: int, spikes: Spikes) -> in
 
 
 def write_flows(folder: Path, scene: str, interval: int, flows: Iterable[Pictures]) -> None:
-    """Write the ways from each window to the next, (H, W, 2) [pixels], in their order."""
+    """Write the flows from each window to the next, (H, W, 2) [pixels], in their order."""
     for number, flow in enumerate(flows):
         path = flow_file(folder, scene, interval, number)
         path.parent.mkdir(parents=True, exist_ok=True)
@@ -114,7 +114,7 @@ def write_flo(path: str | Path, flow: ArrayLike) -> None:
 
     Args:
         path: of the file.
-        flow: the way of each pixel.
+        flow: of each pixel.
 
     Raises:
         InputError: for an array of another shape.

@@ -94,7 +94,7 @@ def test_before_a_moving_camera_everything_at_rest_goes_the_other_way(panned: Pa
     done = export_scflow([panned], tmp_path / "out", intervals=(10,))
     for _, _, flow in loaded(tmp_path / "out", "test/disk", 10):
         assert np.abs(np.median(flow[:4].reshape(-1, 2), axis=0) - (-5.0, 2.5)).max() < 0.01
-    assert done[0].way > 5
+    assert done[0].flow > 5
     assert Manifest.read(panned).pan == PAN
 
 
