@@ -25,8 +25,15 @@ from denoiser.many import ManyDnSS
 from denoiser.online import OnlineDnSS
 from denoiser.passes.pixel_history import STEPS
 from denoiser.passes.recipe import MODES
-from spikecam_env.checked import checked_number
-from spikecam_env.envs.observations.protocol import Blocks, CameraView, Observation, checked_gamma, grey, picture_space
+from spikecam_env.envs.observations.protocol import (
+    Blocks,
+    CameraView,
+    Observation,
+    checked_gamma,
+    checked_white,
+    grey,
+    picture_space,
+)
 from spikecam_env.types import Masks
 
 
@@ -50,7 +57,7 @@ class Rate(Observation):
     begins_alone = False  # on a device the windows of all streams lie in one memory
 
     def __post_init__(self) -> None:
-        checked_number(self.white, "white", 0.0, above=True)
+        checked_white(self.white)
         checked_gamma(self.gamma)
 
     def space(self, view: CameraView) -> spaces.Box:
@@ -69,7 +76,7 @@ class Rate(Observation):
 
     def _shown(self, rate: Any) -> Any:
         """The picture of a rate [spikes/frame]."""
-        return grey(rate / self.white, self.gamma)
+        return grey(rate, self.gamma, self.white)
 
     def age(self, state: Denoising) -> NDArray[np.float64]:
         return np.where(state.finished > 0, state.pushed - state.finished, -1.0)

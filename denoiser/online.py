@@ -22,6 +22,7 @@ from torch import nn
 from tqdm import tqdm
 
 from denoiser.decoders import accumulate, mus
+from denoiser.decoders.brightness import brightened, checked_brightness, saturating
 from denoiser.passes.crossfade import Crossfade
 from denoiser.passes.engine import Engine
 from denoiser.passes.infer import on_host
@@ -35,7 +36,7 @@ from spikecam_env.calibration import Calibration
 from spikecam_env.checked import checked_count
 from spikecam_env.errors import InputError, NotReadyError, unknown_name
 from spikecam_env.streams.packing import as_spikes, unpack_frames
-from spikecam_env.types import Pictures
+from spikecam_env.types import Pictures, Spikes
 
 OUTPUTS = ("spikes", "rate", "both")
 ENGINES = ("torch", "captured")
@@ -72,6 +73,8 @@ class OnlineDnSS:
             of `overlap`, are made of them on the host.  Default: windows on the processor, in compiled code.
         step: `picture` mode only: frames from a picture to the next, 8 to 4000; default 40.
         look: `picture` mode only: age of a picture, 4 to 24 frames; default 12.
+        brightness: spikes are made of rates times this, 0.01 to 100, and cut to one a frame (`saturated`); rates stay
+            as they are (`decoders/brightness.py`).
 
     Raises:
         InputError: unknown options, a network of another recipe or without finite weights, and unusable spikes.
@@ -104,6 +107,7 @@ class OnlineDnSS:
         device: str | torch.device | None = None,
         step: int | None = None,
         look: int | None = None,
+        brightness: float = 1.0,
     ) -> None:
         self.engine = Engine.of(
             recipe, network, precision=precision, kind=engine, stride=stride, unit=unit, device=device, step=step,
@@ -120,6 +124,11 @@ class OnlineDnSS:
         if overlap and recipe.layout.planes % 2:
             raise InputError("overlap is True; passes of this network cannot overlap by half, leave it False")
         self._overlap = overlap
+        self._brightness = checked_brightness(brightness)
+        if self._brightness != 1.0 and recipe.decoder is None:
+            raise InputError(
+                f"brightness = {brightness:g}; a network of one picture a step has no spikes, leave it out"
+            )
         self._decoder = recipe.decoder if decoder is None else decoder
         self._digest = digest(recipe, network.state_dict())
         self.reset()
@@ -155,6 +164,16 @@ class OnlineDnSS:
         return self._overlap
 
     @property
+    def brightness(self) -> float:
+        """Factor between rates and the spikes that are made of them."""
+        return self._brightness
+
+    @property
+    def saturated(self) -> float:
+        """Share of the spikes' pixels and frames so far that are cut to one spike a frame; 0 before the first."""
+        return self._cut / self._made if self._made else 0.0
+
+    @property
     def latency(self) -> int:
         """Frames between a frame's arrival and its output, at most."""
         return self.engine.recipe.layout.latency
@@ -170,6 +189,7 @@ class OnlineDnSS:
         self._as_tensors = False
         self._mixing: Crossfade | None = None
         self._decoding: Any = None
+        self._made = self._cut = 0  # pixels of the frames so far, and those that saturate
         self._ended = False
 
     @property
@@ -219,6 +239,8 @@ class OnlineDnSS:
                 "chains": [passes.state() for passes in self._passes],
                 "mixing": None if self._mixing is None else self._mixing.state(),
                 "decoding": copy.deepcopy(self._decoding),
+                "made": self._made,
+                "cut": self._cut,
                 "ended": self._ended,
             }
         return state
@@ -251,6 +273,7 @@ class OnlineDnSS:
             ) from error
         self._passes, self._mixing = other._passes, other._mixing
         self._decoding, self._ended = other._decoding, other._ended
+        self._made, self._cut = other._made, other._cut
 
     def _begin(self, shape: tuple[int, int]) -> None:
         planes = self.engine.recipe.layout.planes
@@ -267,12 +290,13 @@ class OnlineDnSS:
         for found, ours in zip(state["decoding"] or (), self._decoding or (), strict=True):
             check_like(found, ours, "decoding")
         self._decoding = copy.deepcopy(state["decoding"])
+        self._made, self._cut = int(state["made"]), int(state["cut"])
         self._ended = bool(state["ended"])
 
     def _identity(self) -> dict[str, Any]:
         """The options and weights on which frames depend besides the stream."""
         own = {"recipe and weights": self._digest, "decoder": self._decoder, "overlap": self._overlap}
-        return own | self.engine.identity()
+        return own | {"brightness": self._brightness} | self.engine.identity()
 
     def _denoise(self, done: list[list[tuple[int, Any]]]) -> Denoised:
         """The frames that these passes complete."""
@@ -294,12 +318,19 @@ class OnlineDnSS:
             if self._decoder is None:
                 rates.append(rate)
                 continue
-            fired, self._decoding = _DECODERS[self._decoder].step(rate, self._decoding)
             rates.append(rate)
-            spikes.append(fired)
+            spikes.append(self._fired(rate))
         if self.output == "spikes":
             return np.concatenate(spikes)
         return np.concatenate(rates) if self.output == "rate" else (np.concatenate(spikes), np.concatenate(rates))
+
+    def _fired(self, rate: Pictures) -> Spikes:
+        """Spikes of more rates."""
+        bright = brightened(rate, self._brightness)
+        self._made += rate.size
+        self._cut += saturating(rate, self._brightness)
+        fired, self._decoding = _DECODERS[str(self._decoder)].step(bright, self._decoding)
+        return np.asarray(fired)
 
     def _mixed(self, done: list[list[tuple[int, Pictures]]]) -> list[Pictures]:
         if self._mixing is None:

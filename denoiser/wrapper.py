@@ -9,6 +9,8 @@ import gymnasium
 import numpy as np
 from numpy.typing import NDArray
 
+from denoiser.decoders import accumulate
+from denoiser.decoders.brightness import brightened
 from denoiser.online import OnlineDnSS
 from denoiser.passes.recipe import MODES
 from spikecam_env.errors import InputError, NotReadyError, unknown_name
@@ -31,7 +33,10 @@ class DenoiseObservation(gymnasium.Wrapper, gymnasium.utils.RecordConstructorArg
             wrapper takes another one like that: the same weights, stride and precision, a stream of its own.
         output: "spikes" (same space) or "rate" (float32 in [0, 1]), the only one of "picture".
         warm_up: the picture of the first `denoiser_latency` frames of an episode, for which nothing was denoised:
-            "black", or "noisy", the first block: its frames over again, or their mean rate.
+            "black", or "noisy", the first block: its frames over again (with a brightness, spikes of their mean rate),
+            or their mean rate.
+        brightness: of a mode or a checkpoint, as of `OnlineDnSS`: spikes are made of rates times this.  Rates stay as
+            they are; an `OnlineDnSS` of your own has its own.
 
     Raises:
         InputError: packed or other observations, an unknown mode or output, and an unusable checkpoint.
@@ -52,10 +57,13 @@ class DenoiseObservation(gymnasium.Wrapper, gymnasium.utils.RecordConstructorArg
         output: str = "spikes",
         *,
         warm_up: str = "black",
+        brightness: float = 1.0,
     ) -> None:
         from spikecam_env.envs.wrappers.observe import viewed  # imports scenes, which the denoiser itself spares
 
-        gymnasium.utils.RecordConstructorArgs.__init__(self, mode=mode, output=output, warm_up=warm_up)
+        gymnasium.utils.RecordConstructorArgs.__init__(
+            self, mode=mode, output=output, warm_up=warm_up, brightness=brightness
+        )
         super().__init__(env)
         space = env.observation_space
         if not isinstance(output, str) or output not in OUTPUTS:
@@ -64,7 +72,7 @@ class DenoiseObservation(gymnasium.Wrapper, gymnasium.utils.RecordConstructorArg
             raise unknown_name("warm_up", warm_up, WARM_UPS)
         view = viewed(space, env)
         frames, shape = view.frames_per_step, view.shape
-        made = _denoiser(mode, output, frames)
+        made = _denoiser(mode, output, frames, brightness)
         self._denoiser: OnlineDnSS | None = made
         self._one_picture = made.engine.recipe.decoder is None
         self._type = space.dtype if output == "spikes" else np.dtype(np.float32)
@@ -113,6 +121,9 @@ class DenoiseObservation(gymnasium.Wrapper, gymnasium.utils.RecordConstructorArg
             return np.zeros((count, *block.shape[1:]), self._type)
         if self._type == np.float32:
             return np.repeat(block.mean(axis=0, dtype=np.float32)[None], count, axis=0)
+        if self._open().brightness != 1.0:
+            bright = brightened(block.mean(axis=0, dtype=np.float32)[None], self._open().brightness)
+            return accumulate.step(np.repeat(bright, count, axis=0), accumulate.start(block.shape[1:]))[0]
         return block[np.arange(count) % len(block)].astype(self._type)
 
     def _with_latency(self, info: dict[str, Any], frames: int) -> dict[str, Any]:
@@ -126,9 +137,11 @@ class DenoiseObservation(gymnasium.Wrapper, gymnasium.utils.RecordConstructorArg
         return self._denoiser
 
 
-def _denoiser(mode: Any, output: str, frames: int) -> OnlineDnSS:
+def _denoiser(mode: Any, output: str, frames: int, brightness: float) -> OnlineDnSS:
     """One of the wrapper's own, whose step is a block of so many frames where it has one picture a step."""
     if isinstance(mode, OnlineDnSS):
+        if brightness != 1.0:
+            raise InputError(f"brightness = {brightness}; give it to your OnlineDnSS instead")
         made = mode.another(output)
         if made.engine.recipe.decoder is None and made.engine.step != frames:
             raise InputError(
@@ -138,4 +151,4 @@ def _denoiser(mode: Any, output: str, frames: int) -> OnlineDnSS:
         return made
     if not isinstance(mode, os.PathLike) and not (isinstance(mode, str) and (mode in MODES or mode.endswith(".pt"))):
         raise unknown_name("denoiser mode", mode, (*MODES, "the path of a checkpoint (.pt)", "an OnlineDnSS"))
-    return OnlineDnSS.of_step(mode, frames, output=output)
+    return OnlineDnSS.of_step(mode, frames, output=output, brightness=brightness)

@@ -151,6 +151,16 @@ class Dimmable(Scene, Protocol):
         ...
 
 
+@runtime_checkable
+class Displacing(Scene, Protocol):
+    """A scene that knows exactly where its points go, those that get covered too."""
+
+    def displacement(self, frame: float, by: float, gaze: Gaze | None = None) -> Pictures:
+        """(H, W, 2) float32: displacement of the point seen in each pixel, in the `by` frames after `frame` [pixels], x
+        then y."""
+        ...
+
+
 class Derived:
     """Base of a scene made of `scene`, whose light it shows in its own way; size and frame rate are the same."""
 

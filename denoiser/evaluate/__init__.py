@@ -4,6 +4,7 @@ work.py         the one runner: rows of cases are exposed, made (`rows.py`) and 
 quick.py        held-out scenes by simulation: `spikecam evaluate quick`
 tables.py       the paper's tables and scenes at rest: `spikecam evaluate table1` to `table4`, `still`
 measures.py     the tables' measures of rates against light, as pure functions
+flow.py         optical flow from pictures, and of others' files: `spikecam evaluate flow`
 spikezoo.py     clips in Spike-Zoo's layout, by its protocol: `spikecam evaluate spikezoo`
 truth.py        the truth tests: `spikecam evaluate truth`, of `halves.py`, `fixed_pattern.py` and `quick.py`
 """

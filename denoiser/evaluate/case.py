@@ -41,6 +41,8 @@ class StreamCase:
     """Of the camera before a held-out scene; default the preset `scsim`."""
     white: float = 1.0
     """Light that is white in a clip's picture [spikes/frame]."""
+    pan: tuple[float, float] = (0.0, 0.0)
+    """Velocity of the camera's gaze, to the right and down [pixels/frame]."""
 
     def key(self, row: str) -> Key:
         """Of the record of a row of it."""

@@ -9,6 +9,7 @@ Seed 0 is the camera of the dataset with seed 0; other seeds are other cameras b
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -19,10 +20,12 @@ from scenes.derived.faster import at_speed
 from scenes.protocol import Scene
 from spikecam_env.datasets import PHM, phm_n
 from spikecam_env.datasets.manifest import Manifest
+from spikecam_env.datasets.plan import panned
 from spikecam_env.datasets.renderer import AUTO, renderer_of_process
 from spikecam_env.errors import InputError
 from spikecam_env.sensor import SensorModel, SpikeSensor
 from spikecam_env.streams.hdf5 import open_recording
+from spikecam_env.types import Spikes
 
 SCENES = PHM
 INTERVALS = (3.0, 10.0, 40.0, 100.0)
@@ -68,6 +71,7 @@ def dataset_cases(folder: str | Path) -> list[StreamCase]:
             settings["frames"],
             settings["mean_interval"],
             folder=str(folder),
+            pan=manifest.pan,
         )
         for file in manifest.files
     ]
@@ -79,31 +83,44 @@ def expose(case: StreamCase) -> ExposedStreams:
     around = min(reach(case.interval), middle)
     first, stop = middle - around, min(middle + around + 1, case.frames)
     seen = min(stop + AHEAD, case.frames)
-    scene, noisy, clean = _from_dataset(case, seen) if case.folder else _simulated(case, seen)
+    scene, noisy, clean = scene_and_streams(case, seen)
     keys = scene.radiance(first, stop)
     light = np.stack([light_in_frame(keys, t) for t in range(first, stop)])
     return ExposedStreams(noisy, clean, light, first, stop, middle, white=float(light.max()))
 
 
-def _simulated(case: StreamCase, frames: int) -> tuple[Scene, np.ndarray, np.ndarray]:
-    plan = phm_n(scenes=(case.scene,), seed=case.seed)
+def scene_and_streams(case: StreamCase, frames: int) -> tuple[Scene, Spikes, Spikes]:
+    """The case's scene, and the first frames of its noisy stream and of its clean twin's."""
+    return _from_dataset(case, frames) if case.folder else _simulated(case, frames)
+
+
+def scene_of(case: StreamCase) -> Scene:
+    """The case's scene, as the camera sees it."""
+    if case.folder:
+        manifest = Manifest.read(Path(case.folder))
+        return manifest.scene(_file_of(manifest, case))
     scene = make_scene(case.scene, case.shape, 0, case.interval, renderer=renderer_of_process(AUTO))
-    if case.speed:
-        scene = at_speed(scene, case.speed)
+    return panned(at_speed(scene, case.speed) if case.speed else scene, case.pan, case.frames)
+
+
+def _simulated(case: StreamCase, frames: int) -> tuple[Scene, Spikes, Spikes]:
+    plan = phm_n(scenes=(case.scene,), seed=case.seed)
+    scene = scene_of(case)
     camera = SpikeSensor(SensorModel.preset("scsim"), case.shape, plan.entries[0].unit_seed, engine="auto")
     twin = camera.clean_twin()
     light = scene.radiance(0, frames)
     return scene, camera.step(light, frames), twin.step(light, frames)
 
 
-def _from_dataset(case: StreamCase, frames: int) -> tuple[Scene, np.ndarray, np.ndarray]:
+def _from_dataset(case: StreamCase, frames: int) -> tuple[Scene, Spikes, Spikes]:
     folder = Path(case.folder)
     manifest = Manifest.read(folder)
-    file = next(f for f in manifest.files if Path(f["path"]).stem == case.scene)
+    file = _file_of(manifest, case)
     with open_recording(folder / file["path"]) as recording:
         rows, columns = (slice(0, n) for n in case.shape)
         noisy, clean = (recording.read_crop(s, slice(0, frames), rows, columns) for s in ("spikes", "clean"))
-        frame_rate_hz = recording.attributes["frame_rate_hz"]
-    renderer = renderer_of_process(manifest.settings["renderer"])
-    scene = make_scene(file["scene"], case.shape, file["scene_seed"], case.interval, frame_rate_hz, renderer)
-    return scene, noisy, clean
+    return manifest.scene(file), noisy, clean
+
+
+def _file_of(manifest: Manifest, case: StreamCase) -> dict[str, Any]:
+    return next(f for f in manifest.files if Path(f["path"]).stem == case.scene)

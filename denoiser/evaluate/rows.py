@@ -26,6 +26,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from denoiser.decoders import accumulate, held, mus
+from denoiser.decoders.brightness import brightened
 from denoiser.evaluate.case import ExposedStreams, Planes, StreamCase
 from denoiser.evaluate.held_out import calibrated
 from denoiser.ground.plain_torch import read_plain
@@ -52,6 +53,8 @@ class Row:
     """Of the source's rates, "" where it gives spikes."""
     shows_planes: bool = False
     """Its rate planes are judged too."""
+    brightness: float = 1.0
+    """Spikes are made of the source's rates times this."""
 
 
 @dataclass(frozen=True)
@@ -79,6 +82,8 @@ ROWS: dict[str, Row] = {
     "paper": Row("paper, accumulated", "paper", "accumulate", True),
     "best": Row("best", "best", "accumulate", True),
     "fast": Row("fast", "fast", "accumulate", True),
+    "best-bright": Row("best, spikes 4 times brighter", "best", "accumulate", brightness=4.0),
+    "fast-bright": Row("fast, spikes 4 times brighter", "fast", "accumulate", brightness=4.0),
     "picture": Row("picture", "picture", "accumulate", True),
     "best-overlap": Row("best, passes overlapped", "best-overlap", "accumulate", True),
     "best-map": Row("best with calibration", "best-map", "accumulate", True),
@@ -175,7 +180,12 @@ def streams(
         return [RowStreams(row, exposed.judged(whole), None) for row in rows]
     planes = SOURCES[source].make(case, exposed, weights.path(weights_of(source) or source))
     return [
-        RowStreams(row, decoded(planes, ROWS[row].decoder), planes if ROWS[row].shows_planes else None) for row in rows
+        RowStreams(
+            row,
+            decoded(brightened(planes, ROWS[row].brightness), ROWS[row].decoder),
+            planes if ROWS[row].shows_planes else None,
+        )
+        for row in rows
     ]
 
 

@@ -30,7 +30,8 @@ from denoiser.evaluate.table_summary import groups
 from denoiser.evaluate.work import Kind, WorkItem, evaluated, results_in
 from denoiser.networks.reconstructor_recipe import LEARNED
 from scenes.catalogue import SCENES
-from spikecam_env.checked import checked_count, checked_memory, checked_shape
+from spikecam_env.checked import checked_count, checked_memory, checked_numbers, checked_shape
+from spikecam_env.datasets.plan import AT_REST, FASTEST_PAN
 from spikecam_env.errors import InputError, unknown_name
 from spikecam_env.whole import made_folder
 
@@ -52,10 +53,10 @@ LEAST_FRAMES = 2 * phm.WARM_UP
 
 @dataclass(frozen=True)
 class Table:
-    """A table of the paper."""
+    """A table of the paper, or another of the same cases."""
 
     title: str
-    kind: Kind[RowResult]
+    kind: Kind[Any]
     rows: tuple[str, ...]
 
 
@@ -99,6 +100,8 @@ class TableRequest:
     """Mean frames between spikes."""
     speeds: tuple[float, ...] = (0.0,)
     """[pixels/frame]; 0: the scene's own."""
+    pan: tuple[float, float] = AT_REST
+    """Velocity of the camera's gaze, to the right and down [pixels/frame]."""
     frames: int | None = None
     """Of each stream; default the table's."""
     rows: tuple[str, ...] = ()
@@ -133,16 +136,16 @@ def evaluate_table(name: str, request: TableRequest | None = None, *, progress: 
     if name not in TABLES:
         raise unknown_name("table", name, TABLES)
     table, request = TABLES[name], request or TableRequest()
-    rows = _rows(table, request)
+    rows = rows_of(table, request)
     request.weights.check()
-    cases, missing = _cases(table, request)
-    _check_memory(cases)
+    cases, missing = cases_of(table, request)
+    check_memory(cases)
     missing |= {row: why for row in rows if (why := why_not(ROWS[row].source, request.weights))}
     missing |= {c: why for c in COLUMNS if c in LEARNED and (why := request.weights.missing(c))}
     here = [row for row in rows if row not in missing]
     columns = [column for column in COLUMNS if column not in missing]
     sizes = {row: parameters(ROWS[row].source, request.weights) for row in here}
-    with results_in(request.out, name, _settings(request), RowResult) as results:
+    with results_in(request.out, name, settings_of(request), RowResult) as results:
         folder = nullcontext() if request.out is None else made_folder(request.out / "pictures", "pictures")
         with folder as pictures:
             records = evaluated(
@@ -156,7 +159,8 @@ def evaluate_table(name: str, request: TableRequest | None = None, *, progress: 
     return result
 
 
-def _rows(table: Table, request: TableRequest) -> list[str]:
+def rows_of(table: Table, request: TableRequest) -> list[str]:
+    """The rows that are asked for, in the order of `rows.ROWS`; InputError for unknown ones."""
     for row in request.rows:
         if row not in ROWS:
             raise unknown_name("row", row, ROWS)
@@ -166,7 +170,7 @@ def _rows(table: Table, request: TableRequest) -> list[str]:
     return [row for row in ROWS if row in wanted]
 
 
-def _cases(table: Table, request: TableRequest) -> tuple[list[StreamCase], dict[str, str]]:
+def cases_of(table: Table, request: TableRequest) -> tuple[list[StreamCase], dict[str, str]]:
     """The cases, and by name why others are missing."""
     if table.kind == REAL:
         if request.real != real.FOLDER and not request.real.is_dir():
@@ -184,18 +188,28 @@ def _cases(table: Table, request: TableRequest) -> tuple[list[StreamCase], dict[
         return [StreamCase(n, seed, shape, frames, 0.0) for n in names for seed in range(request.seeds)], {}
     if request.data is not None:
         return [case for case in phm.dataset_cases(request.data) if case.scene in request.scenes], {}
+    right, down = checked_numbers(request.pan, "pan", 2, -FASTEST_PAN, FASTEST_PAN, unit="pixels/frame")
+    pan = (right, down)
     for scene in request.scenes:
         if scene not in SCENES:
             raise unknown_name("scene", scene, SCENES)
     return [
-        StreamCase(scene, seed, checked_shape(request.shape or (250, 400)), _frames(request, interval), interval, speed)
+        StreamCase(
+            scene,
+            seed,
+            checked_shape(request.shape or (250, 400)),
+            _frames(request, interval),
+            interval,
+            speed,
+            pan=pan,
+        )
         for interval, speed, scene, seed in product(
             request.intervals, request.speeds, request.scenes, range(request.seeds)
         )
     ], {}
 
 
-def _check_memory(cases: list[StreamCase]) -> None:
+def check_memory(cases: list[StreamCase]) -> None:
     """InputError where a stream and its pictures need more than the memory."""
     for case in cases:
         size = case.frames * case.shape[0] * case.shape[1] * BYTES
@@ -211,12 +225,13 @@ def _frames(request: TableRequest, interval: float) -> int:
     return request.frames or phm.default_frames(interval)
 
 
-def _settings(request: TableRequest) -> dict[str, Any]:
+def settings_of(request: TableRequest) -> dict[str, Any]:
     """The settings that all results of a file share; scenes, seeds, intervals, speeds and rows can be added to it."""
     return {
         "shape": None if request.shape is None else list(request.shape),
         "frames": request.frames,
         "data": None if request.data is None else str(request.data),
+        "pan": None if request.pan == AT_REST else list(request.pan),
     }
 
 

@@ -8,11 +8,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from scenes.derived.flow import displacement
 from scenes.exposure import METERED_FRAMES
 from scenes.protocol import Derived, Gaze, Scene, Truth
 from spikecam_env.checked import checked_number
 from spikecam_env.errors import InputError
 from spikecam_env.sensor import Keyframes
+from spikecam_env.types import Pictures
 
 MOVES = 0.01
 """Slowest that counts as motion [pixels/frame]: a pixel in 100 frames, the longest window of a picture."""
@@ -50,6 +52,11 @@ class Faster(Derived):
         _refuse(gaze)
         truth = self.scene.truth(frame * self.factor)
         return dataclasses.replace(truth, flow=truth.flow * np.float32(self.factor))
+
+    def displacement(self, frame: float, by: float, gaze: Gaze | None = None) -> Pictures:
+        """The displacement of the scene's points in as many of its own frames."""
+        _refuse(gaze)
+        return displacement(self.scene, frame * self.factor, by * self.factor)
 
 
 def speed_of(scene: Scene) -> float:

@@ -1,9 +1,9 @@
-"""Is the flow right?  Light carried along it must be the light that is there later.
+"""Points carried along the flow: where they go, and whether the flow is right.
 
-The check uses the truth of the scene alone, step by step.  Points come to lie between pixels, and no interpolation of
-pixels gives the light there: a pixel's area passes detail of two pixels' width and less, which its grid cannot hold.
-So the later picture is taken `FINER` x `FINER` times, the camera turned by parts of a pixel.  The light of a pixel at
-the place is read from those.
+Light carried along the flow must be the light that is there later.  The check uses the truth of the scene alone, step
+by step.  Points come to lie between pixels, and no interpolation of pixels gives the light there: a pixel's area passes
+detail of two pixels' width and less, which its grid cannot hold.  So the later picture is taken `FINER` x `FINER`
+times, the camera turned by parts of a pixel.  The light of a pixel at the place is read from those.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from scenes.protocol import Gaze, Scene, Truth
+from scenes.protocol import Displacing, Gaze, Scene, Truth
 from spikecam_env.types import Masks, Pictures
 
 STEP = 5
@@ -55,10 +55,7 @@ def check_flow(scene: Scene, frame: float = 100, frames: int = 40, gaze: Gaze | 
     alone, at = _alone(first), first
     for since in range(0, frames, STEP):
         step = min(STEP, frames - since)
-        here = _read(at.flow, x, y, cv2.INTER_LINEAR)
-        middle = scene.truth(frame + since + step / 2, gaze)
-        flow = _read(middle.flow, x + here[..., 0] * step / 2, y + here[..., 1] * step / 2, cv2.INTER_LINEAR)
-        x, y = x + flow[..., 0] * step, y + flow[..., 1] * step
+        x, y = _carried(scene, at.flow, x, y, frame + since, step, gaze)
         at = scene.truth(frame + since + step, gaze)
         alone &= _inside(x, y, scene.shape) & (_alone_at(at, x, y) == first.object_id)
     before, after = first.radiance, _read(_finer(scene, frame + frames, gaze), FINER * x, FINER * y, cv2.INTER_LANCZOS4)
@@ -71,6 +68,45 @@ def check_flow(scene: Scene, frame: float = 100, frames: int = 40, gaze: Gaze | 
     full = float(before.max())
     errors = {name: _rms((now - then)[alone]) / full for name, (then, now) in expected.items()}
     return FlowCheck(**errors, compared=float(alone.mean()))
+
+
+def displacement(scene: Scene, frame: float, by: float, gaze: Gaze | None = None) -> Pictures:
+    """Displacement of the point seen in each pixel, in the `by` frames after a frame.
+
+    Args:
+        scene: one that does not know it (`Displacing`) has its points carried along its flow, `STEP` frames at a time;
+            beside the edge of an object they may change over to its neighbour.
+        frame: instant at which the points are seen.
+        by: [frames].
+        gaze: of the camera.
+
+    Returns:
+        (H, W, 2) float32, x then y [pixels].
+
+    Example:
+        >>> from scenes.flat.sliding import SlidingTexture
+        >>> displacement(SlidingTexture((16, 24), (4000.0, 0.0)), 100.5, 10.0)[8, 12].round(3).tolist()
+        [1.0, 0.0]
+    """
+    if isinstance(scene, Displacing):
+        return scene.displacement(frame, by, gaze)
+    first_y, first_x = np.indices(scene.shape).astype(np.float32)
+    x, y, since = first_x, first_y, 0.0
+    while since < by:
+        step = min(STEP, by - since)
+        x, y = _carried(scene, scene.truth(frame + since, gaze).flow, x, y, frame + since, step, gaze)
+        since += step
+    return np.stack([x - first_x, y - first_y], axis=-1).astype(np.float32)
+
+
+def _carried(
+    scene: Scene, flow: Pictures, x: Places, y: Places, frame: float, step: float, gaze: Gaze | None
+) -> tuple[Places, Places]:
+    """Places `step` frames after a frame, whose flow is `flow`: along the flow half-way."""
+    here = _read(flow, x, y, cv2.INTER_LINEAR)
+    middle = scene.truth(frame + step / 2, gaze).flow
+    along = _read(middle, x + here[..., 0] * step / 2, y + here[..., 1] * step / 2, cv2.INTER_LINEAR)
+    return x + along[..., 0] * step, y + along[..., 1] * step
 
 
 def _finer(scene: Scene, frame: float, gaze: Gaze | None) -> Pictures:

@@ -4,15 +4,17 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from scenes.protocol import Derived, Gaze, Placed, Truth
+from scenes.derived.flow import displacement
+from scenes.protocol import Derived, Gaze, Placed, Scene, Truth
 from spikecam_env.sensor import Keyframes
+from spikecam_env.types import Pictures
 
 
 @dataclass(frozen=True)
 class Later(Derived):
     """Scene: another one's light, frame 0 being its frame `frames`, a camera at rest being one at `offset`."""
 
-    scene: Placed
+    scene: Scene
     frames: int = 0
     """Whole frames."""
     offset: tuple[float, float] = (0.0, 0.0)
@@ -29,8 +31,14 @@ class Later(Derived):
         """The scene's truth; its camera pose has the offset in it."""
         return self.scene.truth(frame + self.frames, self._gaze_of_scene(gaze))
 
+    def displacement(self, frame: float, by: float, gaze: Gaze | None = None) -> Pictures:
+        """The displacement of the scene's points, the camera's own motion in it."""
+        return displacement(self.scene, frame + self.frames, by, self._gaze_of_scene(gaze))
+
     def places(self, frame: float, gaze: Gaze | None = None) -> dict[str, tuple[float, float]]:
-        """The scene's places."""
+        """The scene's places; none where it has nothing to follow."""
+        if not isinstance(self.scene, Placed):
+            return {}
         return self.scene.places(frame + self.frames, self._gaze_of_scene(gaze))
 
     def _gaze_of_scene(self, gaze: Gaze | None) -> Gaze | None:

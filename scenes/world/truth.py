@@ -39,6 +39,14 @@ def truth_at(spec: WorldSpec, cache: WorldCache, plan: BlockPlan, frame: float, 
     return Truth(seen.radiance, flow, seen.owner, seen.depth, poses | {"camera": camera})
 
 
+def displacement_at(
+    spec: WorldSpec, cache: WorldCache, plan: BlockPlan, frame: float, by: float, gaze: Gaze | None
+) -> Pictures:
+    """See `scenes.world.World.displacement`; the plan is that of the frame's block."""
+    seen = seen_at(spec, cache, plan, frame, gaze, TRUTH_RAYS)
+    return _displaced(spec, seen, frame, by, gaze).astype(np.float32)
+
+
 def seen_at(
     spec: WorldSpec, cache: WorldCache, plan: BlockPlan, frame: float, gaze: Gaze | None, rays: int
 ) -> VisibleBodies:

@@ -26,7 +26,7 @@ from scenes.world.paint import paint, pieces_of
 from scenes.world.plan import BLOCK, BlockPlan, blocks_of, key_frames, plan_block
 from scenes.world.spec import WorldSpec
 from scenes.world.sprites import TRUTH_RAYS
-from scenes.world.truth import places_at, seen_at, truth_at
+from scenes.world.truth import displacement_at, places_at, seen_at, truth_at
 from spikecam_env.sensor import Keyframes
 from spikecam_env.types import Pictures
 
@@ -94,6 +94,10 @@ class World(WorldSpec):
     def truth(self, frame: float, gaze: Gaze | None = None) -> Truth:
         """Ground truth at a frame, each body rendered at that very instant."""
         return truth_at(self, self.cache, self.plan(int(frame // BLOCK)), frame, gaze)
+
+    def displacement(self, frame: float, by: float, gaze: Gaze | None = None) -> Pictures:
+        """(H, W, 2) displacement of the point seen in each pixel, see `scenes.protocol.Displacing`."""
+        return displacement_at(self, self.cache, self.plan(int(frame // BLOCK)), frame, by, gaze)
 
     def picture(self, frame: float, gaze: Gaze | None = None, rays: int = TRUTH_RAYS) -> Pictures:
         """The radiance (H, W) at an instant, by rays x rays a pixel."""

@@ -65,12 +65,15 @@ class DrawnOptions(DatasetOptions):
 
     mean_interval: float = 10.0
     """Exposure: frames between spikes, on average over the picture."""
+    pan: tuple[float, float] = (0.0, 0.0)
+    """Speed of the camera's gaze to the right and down [pixels/frame]; then everything moves."""
     renderer: Literal["auto", "egl-hardware", "egl-software", "osmesa", "embree"] = "auto"
     """Back-end that draws; auto: the best that works here, and the same one when a run is continued."""
 
     def settings(self) -> dict[str, Any]:
         """As fields of a `Plan`."""
-        return {**super().settings(), "mean_interval": self.mean_interval, "renderer": self.renderer}
+        drawn = {"mean_interval": self.mean_interval, "pan": self.pan, "renderer": self.renderer}
+        return super().settings() | drawn
 
 
 @dataclass

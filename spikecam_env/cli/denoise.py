@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, Literal
 
 import tyro
 
-from spikecam_env.cli.mode_weights import Mode
+from spikecam_env.cli.mode_weights import Brightness, Mode, brightness_for
 from spikecam_env.cli.reading import ReadingOptions
 from spikecam_env.numbers import Count, Whole
 
@@ -51,6 +51,9 @@ class Denoise:
     """First frame of the recording to denoise."""
     count: Count | None = None
     """Frames to denoise; default: all from there on."""
+    brightness: Brightness = 1.0
+    """Spikes are made of rates times this, 0.01 to 100, for networks that read spikes in dim light.  auto: the factor
+    that brings the mean to 0.1 spikes a frame, or a smaller one at which less than 1 % of the pixels saturate."""
     film: bool = True
     """Also write film.mp4, noisy beside denoised: at most 240 pictures, evenly over the recording."""
     reading: ReadingOptions = field(default_factory=ReadingOptions)
@@ -69,10 +72,13 @@ class Denoise:
             self._write_pictures(folder, found)
             rows, speed = found.rows(), found.speed()
             summary = {"file": str(self.file), "first": self.first, "mode": self._name, "window": found.window}
-            summary |= {"speed": speed, "rows": rows}
+            summary |= {"brightness": found.brightness, "saturated": found.saturated, "speed": speed, "rows": rows}
             write_json(folder / "summary.json", summary)
             written = sorted(path.name for path in folder.iterdir())
         print(table(rows))
+        if found.brightness != 1.0:
+            cut = f"{100 * found.saturated:.2g} % of them saturate"
+            print(f"denoised.h5: spikes {found.brightness:g} times brighter than the light; {cut}")
         print()
         print(table([speed]))
         print(f"wrote {', '.join(written)} in {self.out}")
@@ -97,6 +103,7 @@ class Denoise:
         window = checked_window(self.window, len(noisy))
         light = light_at(self.file, whole_windows(len(noisy), window), noisy.shape[1:], self.first)
         options: dict[str, Any] = {"overlap": self.overlap, "unit": self.calibration, "engine": self.engine}
+        options["brightness"] = brightness_for(self.brightness, noisy)
         if self.weights is None:
             online = OnlineDnSS.pretrained(self.mode, output="both", **options)
         else:
@@ -112,13 +119,19 @@ class Denoise:
             seconds,
             online.latency,
             first=self.first,
+            recorded=recording.brightness,
+            brightness=online.brightness,
+            saturated=online.saturated,
         )
 
     def _write_stream(self, folder: Path, recording: Recording, found: DenoisedRecording) -> None:
         from spikecam_env.streams import SpikeWriter
+        from spikecam_env.streams.recording import BRIGHTNESS
 
         attributes = {k: v for k, v in recording.attributes.items() if k in ("model", "seed", "scene")}
         attributes |= {"denoiser": self._name, "source": self.file.name, "first": self.first}
+        if (brightness := recording.brightness * found.brightness) != 1.0:
+            attributes |= {BRIGHTNESS: brightness, "saturated": found.saturated}
         shape = found.denoised.shape[1:]
         with SpikeWriter(folder / "denoised.h5", shape, recording.frame_rate_hz, **attributes) as writer:
             writer.append(found.denoised)

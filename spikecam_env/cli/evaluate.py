@@ -9,7 +9,7 @@ import tyro
 
 from spikecam_env.cli.evaluate_agents import Agents
 from spikecam_env.cli.evaluate_modes import Quick, SpikeZoo, TruthTests
-from spikecam_env.cli.evaluate_tables import StillScenes, Table1, Table2, Table3, Table4
+from spikecam_env.cli.evaluate_tables import Flow, StillScenes, Table1, Table2, Table3, Table4
 from spikecam_env.cli.evaluate_tasks import Tasks
 
 
@@ -28,6 +28,7 @@ class Evaluate:
         | Annotated[Table3, tyro.conf.subcommand("table3", prefix_name=False)]
         | Annotated[Table4, tyro.conf.subcommand("table4", prefix_name=False)]
         | Annotated[StillScenes, tyro.conf.subcommand("still", prefix_name=False)]
+        | Annotated[Flow, tyro.conf.subcommand("flow", prefix_name=False)]
         | Annotated[SpikeZoo, tyro.conf.subcommand("spikezoo", prefix_name=False)]
         | Annotated[Tasks, tyro.conf.subcommand("tasks", prefix_name=False)]
         | Annotated[Agents, tyro.conf.subcommand("agents", prefix_name=False)]

@@ -30,8 +30,8 @@ class TableOptions:
     """Folder for the table as text, JSON and a page of pictures; a run that was stopped goes on in it."""
     rows: Annotated[tuple[str, ...], tyro.conf.arg(metavar="ROW...", help_behavior_hint="(default: the table's)")] = ()
     """Rows to show, of noisy, tfp, ssml, spk2img-clean, spk2img-noisy, baseline-held, baseline-mus, baseline,
-    paper-held, paper-mus, paper, fast, best, best-overlap, best-map, clean, light-held, light-mus, light;
-    noisy is always there."""
+    paper-held, paper-mus, paper, fast, best, best-overlap, best-map, best-bright, fast-bright, clean, light-held,
+    light-mus, light; noisy is always there."""
     weights: Path | None = None
     """Folder whose paper.pt, paper-no-refine.pt, fast.pt, best.pt, spk2img-clean.pt, spk2img-noisy.pt and ssml.pt count
     before the shipped ones."""
@@ -85,6 +85,8 @@ class OnScenes(TableOptions):
     """Speeds of the motion [pixels a frame], each a group of the table; 0 is the scene's own speed."""
     frames: Count | None = None
     """Frames of each stream, whose middle one is the picture; by default as many as the interval asks for."""
+    pan: tuple[float, float] = (0.0, 0.0)
+    """Speed of the camera's gaze to the right and down [pixels/frame]; then everything moves."""
     data: Path | None = None
     """Dataset of `spikecam dataset phm-n` to take streams from, instead of simulating them."""
 
@@ -97,6 +99,7 @@ class OnScenes(TableOptions):
             seeds=self.seeds,
             intervals=self.intervals,
             speeds=self.speeds,
+            pan=self.pan,
             frames=self.frames,
             data=self.data,
         )
@@ -143,6 +146,33 @@ class Table4(OnRecordings):
 
     example:  spikecam evaluate table4 --out evaluation
     """
+
+
+@dataclass
+class Flow(OnScenes):
+    """Error of optical flow over 10 and 20 frames.
+
+    That of OpenCV's DIS on pictures of noisy, denoised and clean streams, and that of flows of another program.
+
+    example:  spikecam evaluate flow --size 192 320 --seeds 1 --out evaluation
+              spikecam evaluate flow --data phm --flows scflow-noisy scflow-best
+    """
+
+    seeds: Annotated[int, WholeRange(1, MOST_SCENES)] = 1
+    """Cameras before each scene, each with a fixed pattern and noise of its own; their spread is printed."""
+    flows: Annotated[tuple[Path, ...], tyro.conf.arg(metavar="FOLDER...", help_behavior_hint="(default: none)")] = ()
+    """Folders of .flo files of another program, each a row under its folder's name: SCENE/dt=10/motion_vector/0000.flo
+    and on, as `spikecam export --layout scflow` numbers the truth."""
+
+    def show(self, **options: Any) -> None:
+        from denoiser.evaluate.flow import evaluate_flow
+        from denoiser.evaluate.flow_report import flow_report
+        from denoiser.evaluate.tables import TableRequest
+
+        request = TableRequest(out=self.out, rows=self.rows, jobs=self.jobs, weights=self.given(), **options)
+        print(flow_report(evaluate_flow(request, self.flows, progress=True)), end="")
+        if self.out is not None:
+            print(f"wrote flow.txt, flow.json and flow.png in {self.out}")
 
 
 @dataclass

@@ -2,47 +2,74 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import tyro
 
+from spikecam_env.cli.mode_weights import Brightness, Mode, brightness_for
+from spikecam_env.errors import InputError
 from spikecam_env.numbers import Count, Positive, Whole
+
+if TYPE_CHECKING:
+    from spikecam_env.types import Spikes
 
 
 @dataclass
 class Export:
-    """Write noisy streams and true pictures as Spike-Zoo lays them out: test/spike/*.dat, test/gt/*.png.
+    """Write streams and their truth as others lay them out: Spike-Zoo, or SCFlow, which finds optical flow.
 
-    A clip is cut out about a frame whose light is known, 301 frames long as Spike-Zoo's are.  White of the picture is
-    light 0.6 (spikes a frame), by which Spike-Zoo divides; brighter pixels are cut, and the table says how many.
+    spikezoo: test/spike/*.dat, test/gt/*.png.  A clip is cut out about a frame whose light is known, 301 frames long as
+    Spike-Zoo's are.  White of the picture is light 0.6 (spikes a frame), by which Spike-Zoo divides; brighter pixels
+    are cut, and the table says how many.
+
+    scflow: windows of 25 frames, 10 and 20 frames apart, as test/SCENE/encoding25_dt10/*.npy.  The optical flow from
+    each to the next is test/SCENE/dt=10/motion_vector/*.flo.
 
     example:  spikecam export phm --out phm-zoo
               spikecam evaluate spikezoo phm-zoo
+              spikecam export phm --layout scflow --denoise best --out phm-scflow
     """
 
     sources: Annotated[tuple[Path, ...], tyro.conf.Positional, tyro.conf.arg(metavar="SOURCE...")]
-    """Folders of `spikecam dataset`, and .h5 recordings made with --truth-every."""
+    """Folders of `spikecam dataset`, and for Spike-Zoo .h5 recordings made with --truth-every."""
     out: Path
-    """A new folder for the clips and export.json."""
+    """A new folder for the clips or windows and export.json."""
+    layout: Literal["spikezoo", "scflow"] = "spikezoo"
+    """Whose layout."""
     frames: Count = 301
-    """Spike frames of a clip; odd."""
+    """Spike-Zoo: spike frames of a clip; odd."""
     clips: Count = 1
-    """Clips from one recording at most, spread evenly over its frames of known light."""
+    """Spike-Zoo: clips from one recording at most, spread evenly over its frames of known light."""
     first: Whole = 0
-    """First frame of a recording that a clip may have."""
+    """Spike-Zoo: first frame of a recording that a clip may have."""
     count: Count | None = None
-    """Frames of a recording from there on that clips may have; default: all."""
+    """Spike-Zoo: frames of a recording from there on that clips may have; default: all."""
     rate: Positive = 0.6
-    """Light [spikes/frame] that is white; another one than 0.6 has to be set in Spike-Zoo's data configuration too."""
+    """Spike-Zoo: light [spikes/frame] that is white; another one than 0.6 has to be set in its data configuration
+    too."""
     bits: Literal[8, 16] = 8
-    """Bits of a pixel of the pictures; Spike-Zoo reads the upper 8."""
+    """Spike-Zoo: bits of a pixel of the pictures; it reads the upper 8."""
     stream: Literal["spikes", "clean"] = "spikes"
     """Which stream: the noisy one, or that of the noise-free twin, which datasets hold."""
+    denoise: Mode | None = None
+    """The stream goes through this denoiser first."""
+    overlap: bool = False
+    """With --denoise, but `paper`: passes that overlap by half: less error, twice the time."""
+    brightness: Brightness = 1.0
+    """With --denoise: spikes are made of rates times this, as of `spikecam denoise`; auto: a factor for each
+    recording."""
 
     def run(self) -> None:
         from spikecam_env.cli.table import table
+
+        if self.denoise is None and (self.overlap or self.brightness != 1.0):
+            raise InputError("--overlap and --brightness are of a denoiser; add --denoise best, or leave them out")
+        print(table(self._spikezoo() if self.layout == "spikezoo" else self._scflow()))
+        print(f"wrote {self.out}" + (f"; white is {self.rate:g} spikes/frame" if self.layout == "spikezoo" else ""))
+
+    def _spikezoo(self) -> list[dict[str, Any]]:
         from spikecam_env.datasets.export import export_spikezoo
 
         done = export_spikezoo(
@@ -55,9 +82,10 @@ class Export:
             rate=self.rate,
             bits=self.bits,
             stream=self.stream,
+            restore=self._restore,
             progress=True,
         )
-        rows = [
+        return [
             {
                 "clip": f"{clip.split}/{clip.name}",
                 "frame": clip.frame,
@@ -66,5 +94,38 @@ class Export:
             }
             for clip in done
         ]
-        print(table(rows))
-        print(f"wrote {len(done)} clips of {self.frames} frames in {self.out}; white is {self.rate:g} spikes/frame")
+
+    def _scflow(self) -> list[dict[str, Any]]:
+        from spikecam_env.datasets.export import export_scflow
+
+        for name in ("frames", "clips", "rate", "bits"):
+            default = next(field.default for field in fields(self) if field.name == name)
+            if getattr(self, name) != default:
+                raise InputError(f"--{name} {getattr(self, name)}: SCFlow's layout has no such choice; leave it out")
+        done = export_scflow(self.sources, self.out, stream=self.stream, restore=self._restore, progress=True)
+        return [
+            {
+                "scene": f"{scene.split}/{scene.scene}",
+                "frames apart": scene.interval,
+                "windows": scene.windows,
+                "spikes/frame": scene.rate,
+                "mean flow [pixels]": scene.flow,
+            }
+            for scene in done
+        ]
+
+    @property
+    def _restore(self) -> Any:
+        return None if self.denoise is None else self._denoised
+
+    def _denoised(self, spikes: Spikes) -> tuple[Spikes, dict[str, Any]]:
+        """Spikes through the denoiser, and for the record of the export how."""
+        from denoiser import OnlineDnSS
+        from spikecam_env.cli.restore import restore
+
+        assert self.denoise is not None
+        brightness = brightness_for(self.brightness, spikes)
+        online = OnlineDnSS.pretrained(self.denoise, output="both", overlap=self.overlap, brightness=brightness)
+        found, _, _ = restore(spikes, online, ())
+        how = {"mode": self.denoise, "overlap": self.overlap, "brightness": brightness, "saturated": online.saturated}
+        return found, how

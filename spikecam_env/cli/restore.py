@@ -57,6 +57,12 @@ class DenoisedRecording:
     """Of the denoiser [frames]."""
     first: int = field(default=0, kw_only=True)
     """Number in the recording of the first frame."""
+    recorded: float = field(default=1.0, kw_only=True)
+    """Spikes of `noisy` over those that their light gives."""
+    brightness: float = field(default=1.0, kw_only=True)
+    """Spikes of `denoised` over those that the rates give."""
+    saturated: float = field(default=0.0, kw_only=True)
+    """Share of them that are cut to one a frame."""
 
     @property
     def film_frames(self) -> list[int]:
@@ -84,7 +90,8 @@ class DenoisedRecording:
     @property
     def white(self) -> float:
         """The light that pictures show white."""
-        return white_of([self.planes[frame] for frame in evenly(list(self.planes), MOST_JUDGED)], WHITE)
+        planes = [self.planes[frame] for frame in evenly(list(self.planes), MOST_JUDGED)]
+        return white_of([_light_of(plane, self.recorded) for plane in planes], WHITE)
 
     def rows(self) -> list[dict[str, Any]]:
         """A row a picture: mean rate [spikes/frame], and PSNR [dB] where the true light is known; means over the frames
@@ -105,10 +112,12 @@ class DenoisedRecording:
         """Pictures at a frame, by what they show and the frames that they are of."""
         mean = "one frame" if self.window == 1 else f"mean of {self.window} frames"
         return {
-            ("noisy spikes", mean): lambda t: middleTFP(self.noisy, t, self.window),
-            ("noisy spikes", INTERVAL): lambda t: middleTFI(self.noisy, t),
-            ("denoised spikes", mean): lambda t: middleTFP(self.denoised, t, self.window),
-            ("denoised rate", "one frame"): lambda t: self.planes[t],
+            ("noisy spikes", mean): lambda t: _light_of(middleTFP(self.noisy, t, self.window), self.recorded),
+            ("noisy spikes", INTERVAL): lambda t: _light_of(middleTFI(self.noisy, t), self.recorded),
+            ("denoised spikes", mean): lambda t: _light_of(
+                middleTFP(self.denoised, t, self.window), self.recorded * self.brightness
+            ),
+            ("denoised rate", "one frame"): lambda t: _light_of(self.planes[t], self.recorded),
         }
 
     def speed(self) -> dict[str, Any]:
@@ -119,6 +128,11 @@ class DenoisedRecording:
         late = {} if rate is None else {"latency, ms": 1e3 * self.latency / rate}
         work = {"denoiser, s": self.seconds, "frames/s": frames / self.seconds}
         return {"frames": frames, **known, **work, **real, "latency, frames": self.latency, **late}
+
+
+def _light_of(rate: Pictures, brightness: float) -> Pictures:
+    """Light [spikes/frame] of a rate of spikes so many times brighter."""
+    return rate if brightness == 1.0 else rate / np.float32(brightness)
 
 
 def instant(frame: int, frame_rate_hz: float | None) -> str:

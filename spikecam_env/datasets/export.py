@@ -1,13 +1,18 @@
 """Recordings with ground truth in the layout of others, for their networks.
 
-A clip is cut out about a frame whose light is known: `frames` frames, the known one in the middle.
+Spike-Zoo   a clip is cut out about a frame whose light is known: `frames` frames, the known one in the middle
+SCFlow      windows from end to end, and the optical flow from each to the next: scenes of datasets are made again for
+            it
+
+Either takes the noisy stream, the clean twin's, or that of a denoiser.
 """
 
 from __future__ import annotations
 
 import json
-from collections.abc import Sequence
-from dataclasses import asdict, dataclass
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import asdict, dataclass, field
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -15,18 +20,31 @@ import numpy as np
 from numpy.typing import NDArray
 from tqdm import tqdm
 
-from spikecam_env.checked import checked_count
+from scenes.derived.flow import displacement
+from scenes.protocol import Scene
+from spikecam_env.checked import checked_count, checked_disk
 from spikecam_env.datasets.manifest import Manifest
+from spikecam_env.datasets.scflow import (
+    INTERVALS,
+    REACH,
+    first_frames,
+    scene_folder,
+    write_flows,
+    write_windows,
+)
 from spikecam_env.datasets.spikezoo import CLIP_FRAMES, RATE, Bits, write_clip
 from spikecam_env.errors import InputError
 from spikecam_env.names import distinct
 from spikecam_env.streams.hdf5 import open_recording, read_hdf5
 from spikecam_env.streams.packing import check_range
+from spikecam_env.types import Pictures, Spikes
 from spikecam_env.untrusted import hdf5_values, numbers
 from spikecam_env.whole import whole_folder, write_text_whole
 
 RECORD = "export.json"
 """Beside the clips: how they were made."""
+Restore = Callable[[Spikes], tuple[Spikes, dict[str, Any]]]
+"""(T, H, W) spikes of a whole recording -> as many of a denoiser, and how it was set, for the record."""
 
 
 @dataclass(frozen=True)
@@ -44,6 +62,8 @@ class Exported:
     """Mean light [spikes/frame]."""
     cut: float
     """Share of its pixels that are brighter than white."""
+    denoiser: dict[str, Any] = field(default_factory=dict)
+    """How the stream was denoised; empty where it was not."""
 
 
 def export_spikezoo(
@@ -57,6 +77,7 @@ def export_spikezoo(
     rate: float = RATE,
     bits: Bits = 8,
     stream: str = "spikes",
+    restore: Restore | None = None,
     progress: bool = False,
 ) -> list[Exported]:
     """Write Spike-Zoo's layout (`datasets.spikezoo`) from recordings (.h5) and folders of datasets.
@@ -72,6 +93,7 @@ def export_spikezoo(
         rate: light [spikes/frame] that is white.
         bits: of a pixel of the picture, 8 or 16.
         stream: "spikes", or "clean" for the noise-free twin's.
+        restore: a denoiser that the stream goes through from its first frame.
         progress: whether a bar over recordings is shown.
 
     Raises:
@@ -91,14 +113,112 @@ def export_spikezoo(
         for split, path in tqdm(recordings, desc="export", unit="recording", leave=False, disable=not progress):
             for row, frame in _middles(path, frames, clips, first, count):
                 name = f"{path.stem}-{frame}"
-                spikes = read_hdf5(path, first=frame - frames // 2, count=frames, stream=stream)[0]
+                spikes, how = _cut(path, frame - frames // 2, frames, stream, restore)
                 light = _light(path, row, spikes.shape[1:])
                 cut = write_clip(folder / split, name, spikes, light, rate, bits)
-                done.append(Exported(split, name, path.name, frame, float(light.mean()), cut))
+                done.append(Exported(split, name, path.name, frame, float(light.mean()), cut, how))
         settings = {"layout": "spikezoo", "rate": rate, "bits": bits, "frames": frames, "stream": stream}
         record: dict[str, Any] = {**settings, "clips": [asdict(clip) for clip in done]}
         write_text_whole(folder / RECORD, json.dumps(record, indent=1) + "\n")
     return done
+
+
+@dataclass(frozen=True)
+class ExportedWindows:
+    """A scene of an export for SCFlow."""
+
+    split: str
+    """"train" or "test"."""
+    scene: str
+    """Its folder."""
+    source: str
+    """File name of the recording."""
+    interval: int
+    """Frames from a window to the next."""
+    windows: int
+    rate: float
+    """Mean spikes a frame and pixel."""
+    flow: float
+    """Mean length of the flow from a window to the next [pixels]."""
+    denoiser: dict[str, Any] = field(default_factory=dict)
+    """How the stream was denoised; empty where it was not."""
+
+
+def export_scflow(
+    sources: Sequence[str | Path],
+    out: str | Path,
+    *,
+    intervals: Sequence[int] = INTERVALS,
+    stream: str = "spikes",
+    restore: Restore | None = None,
+    progress: bool = False,
+) -> list[ExportedWindows]:
+    """Write SCFlow's layout (`datasets.scflow`) from folders of datasets, a folder of scenes for each split.
+
+    Args:
+        sources: folders of datasets: their scenes are made again, for the flow from window to window.
+        out: a new folder, which appears whole: test/, train/ and `export.json`.
+        intervals: frames from a window to the next.
+        stream: "spikes", or "clean" for the noise-free twin's.
+        restore: a denoiser that the stream goes through from its first frame.
+        progress: whether a bar over recordings is shown.
+
+    Raises:
+        InputError: for no source, one that is no dataset or is not finished, two scenes of one name, and recordings
+            that are too short for two windows.
+        WriteError: for a folder that exists already.
+    """
+    if not sources:
+        raise InputError("nothing to export; give folders of datasets")
+    files = [(split, path, scene) for source in sources for split, path, scene in _scenes(Path(source))]
+    distinct((f"{split}/{scene_folder(path.stem)}" for split, path, _ in files), "scene")
+    done: list[ExportedWindows] = []
+    with whole_folder(out) as folder:
+        for split, path, scene_again in tqdm(files, desc="export", unit="scene", leave=False, disable=not progress):
+            spikes, how = _cut(path, 0, None, stream, restore)
+            _check_room(spikes, intervals, out, path.stem)
+            scene = scene_again()
+            for interval in intervals:
+                windows = write_windows(folder / split, path.stem, interval, spikes)
+                flows = true_flows(scene, len(spikes), interval)
+                write_flows(folder / split, path.stem, interval, flows)
+                rate, mean = float(spikes.mean()), float(np.linalg.norm(np.stack(flows), axis=-1).mean())
+                name = scene_folder(path.stem)
+                done.append(ExportedWindows(split, name, path.name, interval, windows, rate, mean, how))
+        record = {"layout": "scflow", "stream": stream, "scenes": [asdict(scene) for scene in done]}
+        write_text_whole(folder / RECORD, json.dumps(record, indent=1) + "\n")
+    return done
+
+
+def true_flows(scene: Scene, frames: int, interval: int) -> list[Pictures]:
+    """Flows (H, W, 2) [pixels] from each window of a recording of so many frames to the next, middle to middle."""
+    return [displacement(scene, frame + 0.5, interval) for frame in first_frames(frames, interval)]
+
+
+def _scenes(source: Path) -> Iterator[tuple[str, Path, Callable[[], Scene]]]:
+    """(split, path, maker of the scene) of every recording of a dataset."""
+    if not source.is_dir():
+        raise InputError(f"{source} is no folder of a dataset; SCFlow's truth needs the scene, which a recording lacks")
+    manifest = Manifest.read(source)
+    for (split, path), file in zip(_recordings(source), manifest.files, strict=True):
+        yield split, path, partial(manifest.scene, file)
+
+
+def _check_room(spikes: Spikes, intervals: Sequence[int], out: str | Path, name: str) -> None:
+    """InputError where the disk has no room for the windows and flows of a recording."""
+    pixels = spikes[0].size
+    size = sum(len(first_frames(len(spikes), interval)) * pixels * (2 * REACH + 1 + 8) for interval in intervals)
+    checked_disk(size, out, f"windows of {name}")
+
+
+def _cut(
+    path: Path, first: int, count: int | None, stream: str, restore: Restore | None
+) -> tuple[Spikes, dict[str, Any]]:
+    """Frames of a stream, through a denoiser from its first frame where there is one, and how that was set."""
+    if restore is None:
+        return read_hdf5(path, first=first, count=count, stream=stream)[0], {}
+    whole, how = restore(read_hdf5(path, stream=stream)[0])
+    return whole[first : None if count is None else first + count], how
 
 
 def _recordings(source: Path) -> list[tuple[str, Path]]:

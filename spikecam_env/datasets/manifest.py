@@ -13,7 +13,10 @@ from typing import Annotated, Any
 
 from pydantic import Field, model_validator
 
-from spikecam_env.datasets.plan import Plan
+from scenes.catalogue import make_scene
+from scenes.protocol import Scene
+from spikecam_env.datasets.plan import AT_REST, Plan, panned
+from spikecam_env.datasets.renderer import renderer_of_process
 from spikecam_env.datasets.write import Written
 from spikecam_env.errors import InputError
 from spikecam_env.names import distinct, inside
@@ -27,6 +30,7 @@ from spikecam_env.untrusted import (
     Whole,
     checked_format,
     declared,
+    parse_toml,
     read_json,
 )
 from spikecam_env.version import __version__
@@ -58,6 +62,7 @@ class _Settings(Declared):
     mean_interval: Positive | None = None
     model: str
     renderer: str | None = None
+    pan: Annotated[list[float], Field(min_length=2, max_length=2)] | None = None
     films: _Films | None = None
 
 
@@ -122,6 +127,20 @@ class Manifest:
             inside(folder, entry.path, f"{path}: file", outside=outside)
         distinct((entry.path for entry in file.files), "file")
         return cls(data["settings"], tuple(data["files"]))
+
+    def scene(self, file: dict[str, Any]) -> Scene:
+        """The scene of one of its files, as the camera saw it."""
+        rows, columns = self.settings["shape"]
+        rate = parse_toml(self.settings["model"], f"{NAME}: model").get("frame_rate_hz", 0.0)
+        interval, renderer = self.settings["mean_interval"], renderer_of_process(self.settings["renderer"])
+        scene = make_scene(file["scene"], (rows, columns), file["scene_seed"], interval, rate, renderer)
+        return panned(scene, self.pan, self.settings["frames"])
+
+    @property
+    def pan(self) -> tuple[float, float]:
+        """Velocity of the camera's gaze [pixels/frame]."""
+        right, down = self.settings.get("pan") or AT_REST
+        return right, down
 
     def write(self, folder: Path) -> None:
         """The file appears whole."""

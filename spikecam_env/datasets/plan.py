@@ -14,10 +14,11 @@ from typing import Any
 import numpy as np
 
 from scenes.catalogue import SCENES, make_scene
+from scenes.derived.later import Later
 from scenes.exposure import checked_interval
 from scenes.protocol import Scene
 from scenes.renderers.choose import BACKENDS
-from spikecam_env.checked import checked_count, checked_seed, checked_shape
+from spikecam_env.checked import checked_count, checked_numbers, checked_seed, checked_shape
 from spikecam_env.datasets.films import FilmFolder
 from spikecam_env.datasets.renderer import AUTO, renderer_of_process
 from spikecam_env.errors import InputError, unknown_name
@@ -30,6 +31,11 @@ SPLITS = ("train", "test")
 
 DRAWN = ("mean_interval", "renderer")
 """Settings of scenes that are drawn, which cuts of films do not have."""
+AT_REST = (0.0, 0.0)
+"""Pan of a camera that does not move."""
+
+FASTEST_PAN = 100.0
+"""[pixels/frame]; a picture of 400 is crossed in 4 frames."""
 
 MOST_SCENES = 100_000
 """Of a split; the paper has 100."""
@@ -84,6 +90,8 @@ class Plan:
     model: SensorModel = field(default_factory=SensorModel.preset)
     renderer: str = AUTO
     """Back-end that draws: one of `scenes.renderers.choose.BACKENDS`, or "auto" for the best of the machine."""
+    pan: tuple[float, float] = AT_REST
+    """Velocity of the camera's gaze, to the right and down [pixels/frame]."""
     films: FilmFolder | None = None
     """Of which the scenes are cut; None: scenes are of the catalogue."""
 
@@ -100,12 +108,13 @@ class Plan:
         checked_seed(self.seed)
         checked_count(self.frames)
         checked_shape(self.shape)
+        checked_numbers(self.pan, "pan", 2, -FASTEST_PAN, FASTEST_PAN, unit="pixels/frame")
 
     def scene(self, entry: PlannedScene) -> Scene:
-        """The scene of an entry."""
+        """The scene of an entry, as the camera sees it."""
         if self.films is not None:
             return self.films.cut(entry.scene, entry.scene_seed, self.shape, self.frames, self.model.frame_rate_hz)
-        return make_scene(
+        scene = make_scene(
             entry.scene,
             shape=self.shape,
             seed=entry.scene_seed,
@@ -113,9 +122,11 @@ class Plan:
             frame_rate_hz=self.model.frame_rate_hz,
             renderer=renderer_of_process(self.renderer),
         )
+        return panned(scene, self.pan, self.frames)
 
     def settings(self) -> dict[str, Any]:
-        """Settings that the scenes share, as plain values."""
+        """Settings that the scenes share, as plain values; `pan` where the camera moves."""
+        moving = {} if tuple(self.pan) == AT_REST else {"pan": list(self.pan)}
         plain = {
             "kind": self.kind,
             "shape": list(self.shape),
@@ -125,10 +136,24 @@ class Plan:
             "mean_interval": self.mean_interval,
             "model": self.model.toml(),
             "renderer": self.renderer,
+            **moving,
         }
         if self.films is None:
             return plain
         return {n: v for n, v in plain.items() if n not in DRAWN} | {"films": self.films.settings()}
+
+
+def panned(scene: Scene, pan: tuple[float, float], frames: int) -> Scene:
+    """The scene before a camera whose gaze moves evenly, and is at the scene's middle in the middle of so many frames.
+
+    Args:
+        scene: of the catalogue.
+        pan: velocity of the gaze, to the right and down [pixels/frame].
+        frames: of the recording.
+    """
+    if tuple(pan) == AT_REST:
+        return scene
+    return Later(scene, offset=(-pan[0] * frames / 2, -pan[1] * frames / 2), drift=(pan[0], pan[1]))
 
 
 def spift_n(*, train: int = 100, test: int = 10, seed: int = 0, **settings: Any) -> Plan:

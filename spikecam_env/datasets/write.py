@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from scenes.protocol import Scene
-from spikecam_env.datasets.plan import Plan, PlannedScene
+from spikecam_env.datasets.plan import AT_REST, Plan, PlannedScene
 from spikecam_env.sensor import SpikeSensor
 from spikecam_env.streams import SpikeWriter
 from spikecam_env.whole import said_of
@@ -99,7 +99,9 @@ def sha256_of(path: Path, progress: Callable[[int], object] | None = None) -> st
 def _attributes(plan: Plan, entry: PlannedScene) -> dict[str, Any]:
     settings = plan.settings()
     settings |= {name: value for name, value in settings.pop("films", {}).items() if value is not None}
-    shared = {name: value for name, value in settings.items() if name not in ("shape", "frames", "kind")}
+    shared = {name: value for name, value in settings.items() if name not in ("shape", "frames", "kind", "pan")}
+    if tuple(plan.pan) != AT_REST:
+        shared |= {"pan_x": plan.pan[0], "pan_y": plan.pan[1]}
     own = {"scene": entry.scene, "scene_seed": entry.scene_seed, "unit_seed": entry.unit_seed}
     return {"dataset": plan.kind, **shared, **own}
 

@@ -2,16 +2,21 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 from spikecam_env.errors import InputError
+from spikecam_env.numbers import Range
 from spikecam_env.streams.array_files import read_array_file
 from spikecam_env.streams.hdf5 import HDF5, is_recording, read_hdf5
 from spikecam_env.streams.vidar import read_dat, read_raw
 from spikecam_env.types import Spikes
+
+BRIGHTNESS = "spike_brightness"
+"""Attribute of a recording whose spikes are more than its light gives: by this factor (`Recording.brightness`)."""
 
 
 @dataclass(frozen=True)
@@ -30,6 +35,15 @@ class Recording:
     attributes: dict[str, Any] = field(default_factory=dict)
     """Everything else that the file states, and how it was read."""
 
+    @property
+    def brightness(self) -> float:
+        """Spikes over those that the light gives: a rate is the light once it is divided by this.
+
+        Raises:
+            InputError: where the file states one that is no number above 0.
+        """
+        return Range(0.0, above=True).check(self.attributes.get(BRIGHTNESS, 1.0), f"attribute {BRIGHTNESS}")
+
     def __str__(self) -> str:
         """How it was read, e.g. `301 frames of 250 rows x 400 columns, flip`."""
         frames, rows, columns = self.spikes.shape
@@ -41,14 +55,15 @@ class Recording:
             said.append("flipped upside down" if self.attributes["flip"] else "not flipped")
             said.append(f"{self.attributes['bit_order']}-endian bits")
             said.append(f"size {self.attributes['geometry_from']}")
-        for name in ("key", "item", "time_axis"):
+        for name in ("key", "item", "time_axis", BRIGHTNESS):
             if name in self.attributes:
                 said.append(f"{name} {self.attributes[name]}")
         return ", ".join(said)
 
 
 def read_recording(path: str | Path, **options: Any) -> Recording:
-    """Read a recording.  Warns (UserWarning) where the spikes show that it was read wrong.
+    """Read a recording.  Warns (UserWarning) where the spikes show that it was read wrong, or have another brightness
+    than the light (`Recording.brightness`).
 
     Args:
         path: file; the ending of its name is its format.
@@ -73,7 +88,11 @@ def read_recording(path: str | Path, **options: Any) -> Recording:
     own = " of this package" if read is read_hdf5 else ""
     check_options(options, allowed, f"{Path(path).suffix.lower()} files{own}")
     spikes, attributes = read(path, **options)
-    return Recording(spikes, attributes.get("frame_rate_hz"), attributes)
+    recording = Recording(spikes, attributes.get("frame_rate_hz"), attributes)
+    if (brightness := recording.brightness) != 1.0:
+        what = f"{path}: its spikes are {brightness:g} times as many as its light gives (attribute {BRIGHTNESS})"
+        warnings.warn(f"{what}; divide rates by that to have light", UserWarning, stacklevel=2)
+    return recording
 
 
 def check_options(options: Iterable[str], allowed: tuple[str, ...], kind: str) -> None:

@@ -39,6 +39,7 @@ ONLY_READ = {
     "evaluate table3": "evaluates for minutes",
     "evaluate table4": "evaluates for minutes",
     "evaluate still": "evaluates for minutes",
+    "evaluate flow": "evaluates for minutes",
     "evaluate truth": "evaluates for minutes",
     "evaluate spikezoo": "evaluates for minutes",
     "diagnose": "diagnoses for minutes",

@@ -215,3 +215,18 @@ def test_model_and_light_of_one_episode() -> None:
         env.reset(options={"light": 0.0})
     with pytest.raises(InputError, match="unknown preset"):
         env.reset(options={"model": "perfect"})
+
+
+@pytest.mark.parametrize("law", [TFP, TFI])
+def test_a_white_of_a_quarter_shows_four_times_the_light_and_cuts_what_is_above(law: type) -> None:
+    dim = (np.random.default_rng(2).random((1, FRAMES, *VIEW.shape)) < 0.15).astype(np.uint8)
+    for plain, bright in zip(shown(law(), dim, 16), shown(law(white=0.25), dim, 16), strict=True):
+        inside = plain < 63
+        assert inside.any() and (~inside).any()
+        assert np.abs(bright[inside].astype(int) - 4 * plain[inside]).max() <= 2  # each is rounded
+        assert (bright[plain > 64] == 255).all()
+    same = zip(shown(law(), dim, 16), shown(law(white=1.0), dim, 16), strict=True)
+    assert all(np.array_equal(one, other) for one, other in same)
+    for white in (0, -1, float("nan"), "1", None):
+        with pytest.raises(InputError, match="white"):
+            law(white=white)

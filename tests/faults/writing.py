@@ -170,6 +170,12 @@ WRITINGS: dict[str, Writing] = {
         {},
         resumes=True,
     ),
+    "evaluate flow": Writing(
+        f"evaluate flow --out {{out}} --rows noisy --scenes disk --frames 200 {' '.join(SMALL)}",
+        "flow",
+        {},
+        resumes=True,
+    ),
     "evaluate spikezoo": Writing("evaluate spikezoo {clips} --out {out}", "evaluation", SPIKEZOO, resumes=True),
     "evaluate tasks": Writing("evaluate tasks --tasks Catch-v1 --episodes 1 --json {out}", "tasks.json", TASKS),
     "train-agent": Writing("train-agent Catch-v1 --out {out} --steps 2 --environments 2", "agent", {}, resumes=True),

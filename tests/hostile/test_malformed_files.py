@@ -31,6 +31,7 @@ FRAMES, SHAPE = 64, (8, 8)
 SHARE = 7
 """Of the cases of a reader, every so many go through its command too, which takes thirty times as long."""
 RNG = np.random.default_rng(0)
+FLOW = ("evaluate", "flow", "--rows", "noisy", "--scenes", "disk", "--size", 16, 16)
 
 CAMPAIGN = {
     "format": "spikecam-campaign/1",
@@ -405,6 +406,7 @@ def test_a_malformed_manifest_is_refused(tmp_path: Path, meets) -> None:
         ("weights .pt (evaluate)", ("evaluate", "quick", "--best", "{bad}.pt", "--out", "{out}")),
         ("spikes .h5 (export)", ("export", "{bad}.h5", "--out", "{out}")),
         ("spikes .npz (evaluate truth)", ("evaluate", "truth", "--static", "{bad}.npz", "--out", "{out}")),
+        ("flows (evaluate flow)", (*FLOW, "--flows", "{bad}", "--out", "{out}")),
         ("clips (evaluate spikezoo)", ("evaluate", "spikezoo", "{bad}.dat", "--out", "{out}")),
     ],
 )

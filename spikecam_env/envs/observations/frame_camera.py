@@ -28,6 +28,7 @@ from spikecam_env.envs.observations.protocol import (
     CameraView,
     Observation,
     checked_gamma,
+    checked_white,
     grey,
     picture_space,
 )
@@ -117,7 +118,7 @@ class FrameCamera(Observation):
 
     def __post_init__(self) -> None:
         checked_number(self.rate_hz, "rate_hz", 0.0, above=True, unit="Hz")
-        checked_number(self.white, "white", 0.0, above=True)
+        checked_white(self.white)
         checked_number(self.row_time_s, "row_time_s", 0.0, unit="s")
         checked_gamma(self.gamma)
         checked_switch(self.noise, "noise")

@@ -9,7 +9,7 @@ fired just before its first frame.  Follows motion; coarse where it is bright.  
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import NamedTuple
 
 import numpy as np
@@ -17,7 +17,14 @@ from gymnasium import spaces
 from numpy.typing import NDArray
 
 from spikecam_env.compiled import njit
-from spikecam_env.envs.observations.protocol import Blocks, CameraView, Observation, grey, picture_space
+from spikecam_env.envs.observations.protocol import (
+    Blocks,
+    CameraView,
+    Observation,
+    checked_white,
+    grey,
+    picture_space,
+)
 
 LONGEST = 1 << 24
 """Frames up to which float32 counts one by one (7 minutes at 40 kHz); a longer interval is given as this."""
@@ -72,7 +79,17 @@ class ISI(Observation):
 
 @dataclass(frozen=True)
 class TFI(Observation):
-    """(1, H, W) uint8: 255 where a pixel fires in every frame."""
+    """(1, H, W) uint8: 255 where the rate is `white` or above; by default where a pixel fires in every frame.
+
+    Raises:
+        InputError: for a white not above 0.
+    """
+
+    white: float = field(default=1.0, kw_only=True)
+    """[spikes/frame]; 0.25 shows light four times brighter, all above it as 255."""
+
+    def __post_init__(self) -> None:
+        checked_white(self.white)
 
     def space(self, view: CameraView) -> spaces.Box:
         return picture_space(view)
@@ -82,7 +99,7 @@ class TFI(Observation):
 
     def step(self, blocks: Blocks, state: Waiting) -> tuple[NDArray[np.uint8], Waiting]:
         after = waited(blocks.spikes.view(np.uint8), state)
-        return grey(np.float32(1.0) / known_interval(after)[:, None].astype(np.float32)), after
+        return grey(np.float32(1.0) / known_interval(after)[:, None].astype(np.float32), white=self.white), after
 
 
 @njit(cache=True, nogil=True)

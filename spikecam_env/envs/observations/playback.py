@@ -1,6 +1,6 @@
 """Texture from playback (TFP): the share of the last frames in which a pixel fired.
 
-    picture = 255 * (spikes in the last `window` frames / frames seen of them)^gamma       [spikes/frame]
+    picture = 255 * (spikes in the last `window` frames / frames seen of them / `white`)^gamma       [spikes/frame]
 
 Smooth; blurs motion within the window.  Source: Zhu et al., ICME 2019 (`streams.pictures`).  The root, gamma = 1/2,
 gives counts of all lights the same noise.  Source: Anscombe, Biometrika 35 (1948).
@@ -22,6 +22,7 @@ from spikecam_env.envs.observations.protocol import (
     CameraView,
     Observation,
     checked_gamma,
+    checked_white,
     grey,
     picture_space,
 )
@@ -39,22 +40,25 @@ class RecentFrames(NamedTuple):
 
 @dataclass(frozen=True)
 class TFP(Observation):
-    """(1, H, W) uint8: 255 where a pixel fires in every frame.
+    """(1, H, W) uint8: 255 where the rate is `white` or above; by default where a pixel fires in every frame.
 
     Raises:
-        InputError: for a gamma that is not above 0 and at most 1, a window below 1, and on a device for a window
-            longer than the step's own block.
+        InputError: for a gamma that is not above 0 and at most 1, a white not above 0, a window below 1, and on a
+            device for a window longer than the step's own block.
     """
 
     window: int | None = None
     """Frames; None is the step's own block."""
     gamma: float = field(default=1.0, kw_only=True)
     """Exponent of the picture's law: 0.5, a root, shows dark light brighter."""
+    white: float = field(default=1.0, kw_only=True)
+    """[spikes/frame]; 0.25 shows light four times brighter, all above it as 255."""
 
     takes_tensors = True
 
     def __post_init__(self) -> None:
         checked_gamma(self.gamma)
+        checked_white(self.white)
         if self.window is not None:
             checked_count(self.window, "window")
 
@@ -74,12 +78,12 @@ class TFP(Observation):
         count, kept = blocks.spikes.shape[1], state.frames.shape[1]
         window = self.window or count
         if not isinstance(blocks.spikes, np.ndarray):
-            return grey(blocks.spikes[:, -window:].sum(dim=1).double()[:, None] / window, self.gamma), state
+            return grey(blocks.spikes[:, -window:].sum(dim=1).double()[:, None] / window, self.gamma, self.white), state
         frames = blocks.spikes.view(np.uint8)
         if kept:
             frames = np.concatenate([state.frames, frames], axis=1)
         seen = np.minimum(state.seen + count, window)
-        levels = grey(np.arange(window + 1) / seen[:, None].astype(np.float32), self.gamma)
+        levels = grey(np.arange(window + 1) / seen[:, None].astype(np.float32), self.gamma, self.white)
         return looked_up(frames[:, -window:], levels), RecentFrames(frames[:, frames.shape[1] - kept :], seen)
 
 

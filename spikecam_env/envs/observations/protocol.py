@@ -132,8 +132,9 @@ def with_rows(values: Any, rows: Any, which: Masks) -> Any:
     return changed
 
 
-def grey(rate: NDArray[Any], gamma: float = 1.0) -> NDArray[np.uint8]:
-    """Spikes a frame, 0 to 1 and cut beyond, as 0 to 255: 255 rate^gamma."""
+def grey(rate: NDArray[Any], gamma: float = 1.0, white: float = 1.0) -> NDArray[np.uint8]:
+    """Spikes a frame, 0 to `white` and cut beyond, as 0 to 255: 255 (rate / white)^gamma."""
+    rate = rate if white == 1.0 else rate / white
     if not isinstance(rate, np.ndarray):  # a tensor
         return (255.0 * rate.clamp(max=1.0) ** gamma + 0.5).byte()
     return np.asarray((255.0 * np.minimum(rate, 1.0) ** gamma + 0.5).astype(np.uint8))
@@ -142,6 +143,11 @@ def grey(rate: NDArray[Any], gamma: float = 1.0) -> NDArray[np.uint8]:
 def checked_gamma(gamma: float) -> float:
     """The exponent of a picture's law, above 0 and at most 1."""
     return checked_number(gamma, "gamma", 0.0, 1.0, above=True)
+
+
+def checked_white(white: float) -> float:
+    """The rate that a picture shows as 255 [spikes/frame], above 0."""
+    return checked_number(white, "white", 0.0, above=True)
 
 
 def picture_space(view: CameraView) -> spaces.Box:
