@@ -129,14 +129,16 @@ class RecordedStreams:
         return pixels.reshape(len(packed), self.patch, self.patch)
 
     def _check(self, recording: TwinRecording) -> None:
-        shortest, part = AGES[0][0], _part(recording, self.held_out)
+        """Refuse a recording that is too small, or too short for training or for validation."""
         if min(recording.shape) < self.patch:
             raise InputError(f"{recording.path} has {recording.shape} pixels; patch {self.patch} must fit into it")
-        if len(part) < shortest:
-            raise InputError(
-                f"{recording.path} has {recording.frames} frames, of which {max(0, len(part))} are for "
-                f"{'validation' if self.held_out else 'training'}; {shortest} are needed, make it longer"
-            )
+        shortest = AGES[0][0]
+        for part, what in ((_part(recording, False), "training"), (_part(recording, True), "validation")):
+            if len(part) < shortest:
+                raise InputError(
+                    f"{recording.path} has {recording.frames} frames, of which {len(part)} are for {what}; "
+                    f"{shortest} are needed, make it longer"
+                )
 
 
 def _packed(spikes: Spikes) -> NDArray[np.uint8]:

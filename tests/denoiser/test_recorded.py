@@ -111,7 +111,7 @@ def test_recordings_that_will_not_do_are_refused_in_a_line(film: Path, tmp_path:
         with SpikeWriter(tmp_path / name, SHAPE, 40_000.0) as writer:
             writer.append(spikes, twin)
     refused(tmp_path / "bare.h5", "bare.h5 holds no clean twin; make it with `spikecam film --clean`")
-    refused(tmp_path / "short.h5", "short.h5 has 200 frames, of which .* 96 are needed")
+    refused(tmp_path / "short.h5", "short.h5 has 200 frames, of which 40 are for validation; 96 are needed")
     refused(tmp_path / "none.h5", "no file .*none.h5")
     refused(film, r"film.h5 has \(32, 48\) pixels; patch 48 must fit into it", patch=48)
     with pytest.raises(InputError, match="--recordings is for best, fast, paper"):

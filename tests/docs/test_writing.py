@@ -80,8 +80,8 @@ def test_wrapped_code_says_the_same() -> None:
     assert code_width.commands("spikecam demo  # a disk\n") == "spikecam demo  # a disk\n"
 
 
-def test_there_are_seven_tutorials() -> None:
-    assert len(TUTORIALS) == 7
+def test_there_are_eight_tutorials() -> None:
+    assert len(TUTORIALS) == 8
 
 
 @pytest.mark.parametrize("page", TUTORIALS, ids=lambda page: page.stem)
