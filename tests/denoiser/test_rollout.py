@@ -21,6 +21,8 @@ PATCH = 16
 class Flats:
     """Streams of one light, whose spikes are regular; those in `renewed` begin anew at every call."""
 
+    simulated = True
+
     light = 0.25
 
     def __init__(self, count, patch, device, seed, *, bank=None, compiled=False, twins=()):

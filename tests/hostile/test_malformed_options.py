@@ -83,7 +83,6 @@ COMMAND_LINES: dict[str, tuple[tuple[Any, ...], dict[str, tuple[Any, ...]]]] = {
             "--mean-interval": (*EVERY_FLOAT, *ENDS, "0.5"),
             "--transfer": ("", "log", "gamma0", "gammanan", "gamma1e308"),
             "--truth-every": (-1, 10**16, 10**30),
-            "--interpolation": ("", "fade", "none", "Motion"),
             "--out": ("{here}/x", "{here}/x.avi", "{here}/none/x.h5"),
         },
     ),
