@@ -83,7 +83,6 @@ WRONG = {
     "no law": ("    x <- x (1 - loss)\n", "", "no indented equation"),
     "identification of another kind": ("Identification(needs=Needs.STEADY)", "{}", "its identification is none"),
     "needs in text": ("needs=Needs.STEADY", 'needs="steady"', "its identification is none"),
-    "response in text": ("needs=Needs.STEADY", 'response="square"', "its response is none; write response=Response.X"),
     "fitted unknown": ("needs=Needs.STEADY", 'fitted=("loss", "tau")', "unknown parameter of grey_filter .*'tau'"),
     "shapes unknown": ("needs=Needs.STEADY", 'shapes={"tau": (1.0,)}', "unknown parameter of grey_filter .*'tau'"),
     "shapes out of bounds": ("needs=Needs.STEADY", 'shapes={"loss": (2.0,)}', "loss = 2.0; it must be"),

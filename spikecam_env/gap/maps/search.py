@@ -1,8 +1,8 @@
 """Search for effects of the pattern in maps: candidates fitted, the best added, while something is left.
 
-Parameters are fitted to the statistics by robust least squares, with the same draws at every step, together with all
-that were added before and the model's own spreads.  How a spread is shared between a Gaussian and a tail is nearly
-free, and stated errors do not say so.
+Parameters are fitted by Gauss-Newton on the statistics, with the same draws at every step, together with all that were
+added before and the model's own spreads; how a spread is shared between a Gaussian and a tail is nearly free, and
+stated errors do not say so.
 """
 
 from __future__ import annotations
@@ -10,29 +10,22 @@ from __future__ import annotations
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
-from functools import reduce
 
 import numpy as np
-from scipy.optimize import least_squares
+from numpy.typing import NDArray
 
 from spikecam_env.gap.candidates.strength import bounded, with_effect
 from spikecam_env.gap.candidates.table import candidate
 from spikecam_env.gap.compare.distance import HEAVY, is_significant, residual, robust_squares
-from spikecam_env.gap.compare.prediction import Null, Prediction, total_variance, values_of
+from spikecam_env.gap.compare.prediction import Null, Prediction, values_of
 from spikecam_env.gap.maps.bank import MapCase, map_bank, unit_maps, with_use
 from spikecam_env.gap.statistics import StatisticKey
 from spikecam_env.gap.twins.fresh_units import SPREAD_PARAMETERS as UNIT_SPREADS
 from spikecam_env.sensor import CATALOGUE, SensorModel
 from spikecam_env.types import Floats
 
-STEPS = 10
-"""Models that a fit tries at most, each with derivatives where it is better than those before."""
-
-LEAST_STEP = 0.01
-"""Relative step that ends a fit: a tenth of the errors of spreads in maps of some thousand pixels."""
-
-OPEN = 1e-9
-"""Curvature of a parameter that changes nothing: its error is then without a limit."""
+STEPS = 6
+"""Steps of a fit."""
 
 FITTED_SPREADS = {"response": UNIT_SPREADS["gain"], "dark": UNIT_SPREADS["dark"]}
 """Parameters that are scaled to fit how pixels differ: by the quantity they spread, then by effect."""
@@ -42,6 +35,9 @@ LINEAR_PARAMETERS = ("centre_x", "centre_y")
 
 DERIVATIVE_STEP = 0.1
 """Step of a derivative, of a parameter's logarithm or in its own unit."""
+
+FIRST_DAMPING = 0.02
+"""Share of the curvature that is added to it at first (Levenberg and Marquardt)."""
 
 
 @dataclass(frozen=True)
@@ -147,36 +143,28 @@ def fit_candidate(case: MapCase, start: PatternModel, null: Null, values: Floats
     varied = [("", w) for w in FITTED_SPREADS if w in state.factors]
     varied += [(n, p) for n in state.added for p in fitted_parameters(n)]
     use, units = with_use(case, null.keys, "fit"), case.settings.maps.units
-
-    def at(x: Floats) -> PatternModel:
-        return reduce(lambda model, step: _moved(model, *step), zip(varied, x.tolist(), strict=True), state)
-
-    def means(x: Floats) -> Floats:
-        return unit_means(at(x), case, null.keys, [0])
-
-    def left(x: Floats) -> Floats:
-        return residual(null, values, mean_prediction(null, means(x), 1))[use]
-
-    def derivatives(x: Floats) -> Floats:
-        here = means(x)
-        noise = np.sqrt(total_variance(null, mean_prediction(null, here, 1)))
-        changes = [means(x + DERIVATIVE_STEP * one) - here for one in np.eye(len(x))]
-        return np.asarray(np.nan_to_num(-np.stack(changes, axis=1) / DERIVATIVE_STEP / noise[:, None])[use])
-
-    best, sd = state, dict.fromkeys((f"{n}.{p}" for n, p in varied), np.nan)
-    if varied:
-        end = least_squares(
-            left,
-            np.zeros(len(varied)),
-            derivatives,
-            loss="cauchy",
-            f_scale=np.sqrt(HEAVY),
-            xtol=LEAST_STEP,
-            max_nfev=STEPS,
-        )
-        best = at(end.x)
-        covariance = np.linalg.inv(end.jac.T @ end.jac + OPEN * np.eye(len(varied)))
+    sd = dict.fromkeys((f"{n}.{p}" for n, p in varied), np.nan)
+    damping, best, least = FIRST_DAMPING, state, np.inf
+    for _ in range(STEPS):
+        at = unit_means(state, case, null.keys, [0])
+        now = robust_squares(residual(null, values, mean_prediction(null, at, 1))[use])
+        if now > least:
+            damping *= 8.0
+        else:
+            best, least, predicted = state, now, at
+            jacobian = np.stack(
+                [unit_means(_moved(best, f, DERIVATIVE_STEP), case, null.keys, [0]) - predicted for f in varied], axis=1
+            ) / DERIVATIVE_STEP if varied else np.zeros((len(at), 0))  # fmt: skip
+            damping *= 0.5
+        if not varied:
+            break
+        step, covariance = _step(null, values, predicted, np.nan_to_num(jacobian), use, damping)
         sd = dict(zip(sd, np.sqrt(np.diag(covariance)), strict=True))
+        state = best
+        for f, s in zip(varied, np.clip(step, -1.0, 1.0), strict=True):
+            state = _moved(state, f, float(s))
+        if np.abs(step).max() < 0.01:
+            break
     predicted = unit_means(best, case, null.keys, range(units))
     rho = residual(null, values, mean_prediction(null, predicted, units))
     return MapFit(name, best, sd, predicted, rho, robust_squares(rho[use]))
@@ -198,3 +186,16 @@ def _moved(state: PatternModel, parameter: tuple[str, str], step: float) -> Patt
     old = effect.parameters()
     new = old[key] + step if key in LINEAR_PARAMETERS else old[key] * np.exp(step)
     return replace(state, model=with_effect(state.model, name, bounded(name, {**old, key: new})))
+
+
+def _step(
+    null: Null, values: Floats, predicted: Floats, jacobian: Floats, use: NDArray[np.bool_], damping: float
+) -> tuple[Floats, Floats]:
+    """Damped Gauss-Newton step under the heavy-tailed loss, and the covariance of parameters."""
+    rho = residual(null, values, mean_prediction(null, predicted, 1))
+    gap = np.nan_to_num(values - predicted)
+    noise = np.where(np.abs(rho) > 1e-9, np.abs(gap) / np.maximum(np.abs(rho), 1e-9), null.noise)
+    w = np.where(use, (HEAVY + 1) / (HEAVY + rho**2) / noise**2, 0.0)
+    square = jacobian.T @ (w[:, None] * jacobian) + 1e-9 * np.eye(jacobian.shape[1])
+    step = np.linalg.solve(square + damping * np.diag(np.diag(square)), jacobian.T @ (w * gap))
+    return np.asarray(step, np.float64), np.asarray(np.linalg.inv(square), np.float64)
