@@ -64,12 +64,14 @@ def gain_change(one: BaseFit, other: BaseFit) -> float:
 def _surface(unit: BaseFit, known: NDArray[np.bool_], y: Floats) -> Floats:
     """(P,) least-squares polynomial of second order through y, of the pixels `known`, over their gain and dark level.
 
-    Outliers of y are cut.  Pixels far from those known get a value within y: the polynomial says nothing of them.
+    Outliers of y are cut.  Other pixels get the value at the nearest gain and dark level of those known: the polynomial
+    says nothing beyond.
     """
     y = np.clip(y, *np.quantile(y, [0.02, 0.98]))
-    g, d = ((v - v[known].mean()) / max(float(v[known].std()), 1e-12) for v in (unit.gain, unit.dark))
+    ranges = ((v, v[known]) for v in (unit.gain, unit.dark))
+    g, d = ((np.clip(v, k.min(), k.max()) - k.mean()) / max(float(k.std()), 1e-12) for v, k in ranges)
     over = np.stack([np.ones_like(g), g, d, g * g, g * d, d * d], axis=1)
-    return np.asarray(np.clip(over @ np.linalg.lstsq(over[known], y)[0], y.min(), y.max()), np.float64)
+    return np.asarray(over @ np.linalg.lstsq(over[known], y)[0], np.float64)
 
 
 def extrapolated_unit(bare: BaseFit, inferred: BaseFit, factor: float, most: float) -> BaseFit:
