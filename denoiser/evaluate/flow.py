@@ -19,7 +19,6 @@ from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
-import cv2
 import numpy as np
 
 from denoiser.evaluate import phm
@@ -31,6 +30,7 @@ from denoiser.evaluate.rows import ROWS, RowStreams, why_not
 from denoiser.evaluate.tables import Table, TableRequest, cases_of, check_memory, rows_of, settings_of
 from denoiser.evaluate.work import Kind, WorkItem, evaluated, results_in
 from scenes.derived.faster import MOVES
+from scenes.film.found_motion import LEAST_SIDE, dis_flow
 from spikecam_env.datasets.export import true_flows
 from spikecam_env.datasets.scflow import INTERVALS, first_frames, flow_file, read_flo
 from spikecam_env.errors import InputError
@@ -45,8 +45,6 @@ PLANE = "rate plane"
 """Name of the picture that is a rate plane."""
 WHITE = 99.8
 """Percentile of the first picture that is white to DIS; all above it is cut."""
-LEAST_SIDE = 16
-"""Rows and columns of a picture, at least: DIS finds nothing in smaller ones."""
 DRAWN = INTERVALS[-1]
 """Flows over so many frames are drawn, of the pair in the middle."""
 ENTERED = "flow"
@@ -124,9 +122,7 @@ def dis(first: Planes, second: Planes) -> Pictures:
         [2.0, 0.0]
     """
     white = float(np.percentile(first, WHITE)) or float(first.max()) or 1.0
-    a, b = (np.rint(np.clip(picture / white, 0, 1) * 255).astype(np.uint8) for picture in (first, second))
-    found = cv2.DISOpticalFlow.create(cv2.DISOPTICAL_FLOW_PRESET_MEDIUM).calc(a, b, np.zeros((*a.shape, 2), np.float32))
-    return np.asarray(found, np.float32)
+    return dis_flow(*(np.rint(np.clip(picture / white, 0, 1) * 255).astype(np.uint8) for picture in (first, second)))
 
 
 def end_point_errors(found: Pictures, true: Pictures, frames: int) -> dict[str, float | None]:

@@ -20,7 +20,7 @@ from denoiser.training.pairs import WARM_UP
 from denoiser.training.simulated import AGES, TWINS, StreamBlock
 from spikecam_env.datasets import TwinRecording
 from spikecam_env.errors import InputError
-from spikecam_env.streams import isi_planes
+from spikecam_env.streams import isi_planes, pack_frames, unpack_frames
 from spikecam_env.streams.hdf5 import open_recording
 from spikecam_env.types import Spikes
 
@@ -122,11 +122,10 @@ class RecordedStreams:
         with open_recording(recording.path) as file:
             noisy = file.read_crop("spikes", slice(first, first + length), *crop)
             clean = file.read_crop("clean", slice(before, after), *crop)
-        return Cut(_packed(noisy), _packed(clean), first - before)
+        return Cut(pack_frames(noisy), pack_frames(clean), first - before)
 
     def _unpacked(self, packed: NDArray[np.uint8]) -> Spikes:
-        pixels = np.unpackbits(packed, axis=1, count=self.patch * self.patch)
-        return pixels.reshape(len(packed), self.patch, self.patch)
+        return unpack_frames(packed, (self.patch, self.patch))
 
     def _check(self, recording: TwinRecording) -> None:
         """Refuse a recording that is too small, or too short for training or for validation."""
@@ -139,10 +138,6 @@ class RecordedStreams:
                     f"{recording.path} has {recording.frames} frames, of which {len(part)} are for {what}; "
                     f"{shortest} are needed, make it longer"
                 )
-
-
-def _packed(spikes: Spikes) -> NDArray[np.uint8]:
-    return np.packbits(spikes.reshape(len(spikes), -1), axis=1)
 
 
 def _part(recording: TwinRecording, held_out: bool) -> range:

@@ -46,7 +46,7 @@ def found_motion(before: Pictures, after: Pictures) -> tuple[MovingPicture, Movi
     if min(before.shape) < LEAST_SIDE:
         return None
     first, second = _codes(before, after)
-    forth, back = _flow(first, second), _flow(second, first)
+    forth, back = dis_flow(first, second), dis_flow(second, first)
     seen_later, seen_before = _consistent(forth, back), _consistent(back, forth)
     if min(seen_later.mean(), seen_before.mean()) < LEAST_ALIKE:
         return None
@@ -60,8 +60,16 @@ def _codes(before: Pictures, after: Pictures) -> tuple[NDArray[np.uint8], NDArra
     return first, second
 
 
-def _flow(before: NDArray[np.uint8], after: NDArray[np.uint8]) -> Pictures:
-    """(H, W, 2) from points of `before` to their places in `after` [pixels]."""
+def dis_flow(before: NDArray[np.uint8], after: NDArray[np.uint8]) -> Pictures:
+    """(H, W, 2) from points of a picture in bytes to their places in another [pixels], by OpenCV's DIS.
+
+    Example:
+        >>> waves = np.add.outer(np.sin(np.arange(40) / 3), np.cos(np.arange(60) / 4))
+        >>> picture = (63 * (waves + 2)).astype(np.uint8)
+        >>> flow = dis_flow(picture, np.roll(picture, 2, axis=1))
+        >>> np.median(flow[10:30, 10:50], axis=(0, 1)).round(1).tolist()
+        [2.0, 0.0]
+    """
     search = cv2.DISOpticalFlow.create(cv2.DISOPTICAL_FLOW_PRESET_MEDIUM)
     return np.asarray(search.calc(before, after, None), np.float32)  # type: ignore[call-overload]
 
