@@ -98,7 +98,7 @@ class Export:
     def _scflow(self) -> list[dict[str, Any]]:
         from spikecam_env.datasets.export import export_scflow
 
-        for name in ("frames", "clips", "rate", "bits"):
+        for name in ("frames", "clips", "first", "count", "rate", "bits"):
             default = next(field.default for field in fields(self) if field.name == name)
             if getattr(self, name) != default:
                 raise InputError(f"--{name} {getattr(self, name)}: SCFlow's layout has no such choice; leave it out")
