@@ -187,6 +187,8 @@ def cases_of(table: Table, request: TableRequest) -> tuple[list[StreamCase], dic
         names = held_out.still_scenes(checked_count(request.still_scenes, "scenes"))
         return [StreamCase(n, seed, shape, frames, 0.0) for n in names for seed in range(request.seeds)], {}
     if request.data is not None:
+        if tuple(request.pan) != AT_REST:
+            raise InputError(f"pan is that of the dataset {request.data}; make one with `spikecam dataset --pan`")
         return [case for case in phm.dataset_cases(request.data) if case.scene in request.scenes], {}
     right, down = checked_numbers(request.pan, "pan", 2, -FASTEST_PAN, FASTEST_PAN, unit="pixels/frame")
     pan = (right, down)

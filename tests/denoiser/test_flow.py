@@ -182,6 +182,7 @@ def test_nonsense_is_refused_in_a_line(dataset: Path, truth: Path, tmp_path: Pat
         (("--scenes", "disk", "--frames", 150), "at least 200"),
         (("--scenes", "disk", "--pan", "nan", 0), "--pan"),
         (("--data", dataset, "--scenes", "fan"), "no scene to evaluate"),
+        ((*data, "--pan", 0.3, 0), "pan is that of the dataset"),
     ):
         capsys.readouterr()
         assert spikecam("evaluate", "flow", *options) == 2
