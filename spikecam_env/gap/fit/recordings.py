@@ -17,6 +17,7 @@ OF_EVENTS = 3
 """Twins of a sparse or mixed effect."""
 
 SPARSE_OR_MIXED = (Response.EVENTS, Response.FEW_PIXELS, Response.MIXED)
+"""Responses of which one simulation says little, and a stronger effect no more."""
 
 OF_RANDOM_COURSE = 2 * OF_EVENTS
 """Twins of an effect of random course: their scatter counts."""
