@@ -19,7 +19,8 @@ from spikecam_env.bench.machine import SHAPE, machine
 from spikecam_env.bench.sensor import BLOCK, REAL_TIME
 from spikecam_env.cli.table import table
 from spikecam_env.sensor import SpikeSensorBatch
-from spikecam_env.sensor.kernels import cuda, fast
+from spikecam_env.sensor.engines import gpu
+from spikecam_env.sensor.engines.compiled import fast
 from spikecam_env.sensor.light import Segment
 from spikecam_env.sensor.model import SensorModel, generator
 
@@ -44,13 +45,13 @@ def rows(interval: float, cameras: int, device: torch.device, shape: tuple[int, 
 
     units = [model.draw_unit(shape, seed) for seed in range(cameras)]
     phases = [generator(seed, "phase").random(pixels) for seed in range(cameras)]
-    state = cuda.start(units, phases, range(cameras), device)
+    state = gpu.start(units, phases, range(cameras), device)
     light = [Segment(start[b], stop[b], BLOCK, 0, BLOCK) for b in range(cameras)]
-    batch = cuda.BatchSegment.of(light, device)
+    batch = gpu.BatchSegment.of(light, device)
     spikes = torch.empty((cameras, BLOCK, pixels), dtype=torch.uint8, device=device)
 
     measured = [("fast", 1, BLOCK, base)]
-    for kernel in dict.fromkeys((cuda.kernel_on(device), "torch")):
+    for kernel in dict.fromkeys((gpu.kernel_on(device), "torch")):
         run = _kernel(kernel)
         rate = _rate(lambda run=run: run(state, batch, spikes), spikes.numel(), device)  # type: ignore[misc]
         measured.append((kernel, cameras, BLOCK, rate))
@@ -73,12 +74,12 @@ def rows(interval: float, cameras: int, device: torch.device, shape: tuple[int, 
     ]
 
 
-def _kernel(name: str) -> Callable[[cuda.BatchState, cuda.BatchSegment, torch.Tensor], None]:
+def _kernel(name: str) -> Callable[[gpu.BatchState, gpu.BatchSegment, torch.Tensor], None]:
     if name == "triton":
-        from spikecam_env.sensor.kernels.cuda import jump
+        from spikecam_env.sensor.engines.gpu import jump
 
         return jump.advance
-    from spikecam_env.sensor.kernels.cuda import dense
+    from spikecam_env.sensor.engines.gpu import dense
 
     return dense.advance
 
@@ -104,9 +105,9 @@ def _rate(run: Callable[[], object], steps: int, device: torch.device | None = N
 if __name__ == "__main__":
     print(machine())
     if torch.cuda.is_available():
-        gpu = torch.device("cuda")
+        device = torch.device("cuda")
         print(f"GPU: {torch.cuda.get_device_name()}, torch {torch.__version__}")
-        found = [row for interval in INTERVALS for cameras in (1, 16, 64) for row in rows(interval, cameras, gpu)]
+        found = [row for interval in INTERVALS for cameras in (1, 16, 64) for row in rows(interval, cameras, device)]
     else:
         print("No CUDA device here: this says nothing of a GPU.  Below, the torch fallback on the processor, small.")
         found = [row for cameras in (1, 2) for row in rows(20.0, cameras, torch.device("cpu"))]

@@ -40,7 +40,7 @@ from spikecam_env.bench.machine import FRAME_RATE_HZ, SHAPE, machine
 from spikecam_env.cli.files import write_json
 from spikecam_env.cli.table import table
 from spikecam_env.sensor import SensorModel, SpikeSensorBatch
-from spikecam_env.sensor.kernels import cuda
+from spikecam_env.sensor.engines import gpu
 from spikecam_env.sensor.light import segments
 from spikecam_env.sensor.model import generator
 from spikecam_env.whole import check_file
@@ -97,7 +97,7 @@ class RecordedCamera:
         self._numbers = torch.from_numpy(self._painter.numbers([first])).to(device)
         unit = SensorModel.preset(model).draw_unit(scene.shape, seed)
         phase = generator(seed, "phase").random(scene.shape[0] * scene.shape[1])
-        self._pixels = cuda.start([unit], [phase], [seed], device)
+        self._pixels = gpu.start([unit], [phase], [seed], device)
         fresh = [tensor.clone() for tensor in self._pixels.tensors]
         self._out = torch.empty((1, BLOCK, phase.size), dtype=torch.uint8, device=device)
         self._block = captured(self._exposed, device)
@@ -114,9 +114,9 @@ class RecordedCamera:
     def _exposed(self) -> torch.Tensor:
         light = self._painter.paint(self._numbers, still=True).reshape(BLOCK + 1, 1, -1)
         for k in range(BLOCK):
-            timing = cuda.BatchSegment.held(light[k], 1)  # of one frame
-            segment = cuda.BatchSegment(light[k], light[k + 1], timing.timing, timing.per_twice, 1)
-            cuda.run(self._pixels, segment, self._out[:, k : k + 1])
+            timing = gpu.BatchSegment.held(light[k], 1)  # of one frame
+            segment = gpu.BatchSegment(light[k], light[k + 1], timing.timing, timing.per_twice, 1)
+            gpu.run(self._pixels, segment, self._out[:, k : k + 1])
         return self._out
 
 
@@ -213,14 +213,14 @@ def one_frame(sizes: Sizes, device: torch.device) -> Rows:
         sensors.step(light)
 
     phase = generator(0, "phase").random(picture.numel())
-    pixels = cuda.start([model.draw_unit(sizes.shape, 0)], [phase], [0], device)
-    segment = cuda.BatchSegment.of(list(segments(light, 0, 1)), device)
+    pixels = gpu.start([model.draw_unit(sizes.shape, 0)], [phase], [0], device)
+    segment = gpu.BatchSegment.of(list(segments(light, 0, 1)), device)
     out = torch.empty((1, 1, picture.numel()), dtype=torch.uint8, device=device)
     ways = {
         "step, light that stays": lambda: sensors.step(picture),
         "step, light new in each frame": moving,
-        "kernel": lambda: cuda.run(pixels, segment, out),
-        "kernel, recorded": captured(lambda: cuda.run(pixels, segment, out), device),
+        "kernel": lambda: gpu.run(pixels, segment, out),
+        "kernel, recorded": captured(lambda: gpu.run(pixels, segment, out), device),
     }
     found = {way: _seconds(work, device) for way, work in ways.items()}
     return [{"way": way, "us a frame": 1e6 * seconds, "frames/s": 1 / seconds} for way, seconds in found.items()]

@@ -8,6 +8,9 @@ Processes that start together, as environments of a vector or workers of a datas
 same moment.  One compiles a function, and the others wait and read the result: to compile the sensor's loop takes a
 processor up to a minute.
 
+numba compiles a function anew when its own file has changed.  Here it does too when a file has changed of which the
+function's module uses compiled code, or a number of that module, wherever it comes from.
+
 With NUMBA_DISABLE_JIT functions stay Python; those of the fast engine and of painting cannot, and say so when called.
 """
 
@@ -15,16 +18,20 @@ from __future__ import annotations
 
 import os
 import stat
+import sys
 import tempfile
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from functools import lru_cache
 from pathlib import Path
 from typing import Any, TypeVar
 
 import numba
+import numpy as np
 from numba import config
 from numba.core.compiler_lock import global_compiler_lock
+from numba.core.dispatcher import Dispatcher
+from numba.core.extending import _Intrinsic
 
 from spikecam_env.locks import lock
 
@@ -59,8 +66,51 @@ def _keep(dispatcher: Any) -> None:
             return
         with _cache_in(folder), suppress(RuntimeError):
             dispatcher.enable_caching()
+    _see_imports(dispatcher)
     _forgive(dispatcher)
     _take_turns(dispatcher)
+
+
+def _see_imports(dispatcher: Any) -> None:
+    """Let kept code be stale when a file or a number has changed that is compiled into it."""
+    kept = getattr(getattr(dispatcher, "_cache", None), "_cache_file", None)
+    if kept is None or not hasattr(kept, "_source_stamp"):
+        return
+    values = dispatcher.py_func.__globals__
+    files = sorted(_files_compiled_in(values, set()))
+    stamps = tuple((file, status.st_mtime, status.st_size) for file in files if (status := _status(file)))
+    kept._source_stamp = kept._source_stamp, stamps, _numbers(values)
+
+
+def _files_compiled_in(values: Mapping[str, Any], seen: set[str]) -> set[str]:
+    """Files of the compiled functions among a module's values, and among those of their modules."""
+    files = set()
+    for value in list(values.values()):
+        if not isinstance(value, (Dispatcher, _Intrinsic)) or value.__module__ in seen:
+            continue
+        seen.add(value.__module__)
+        module = sys.modules.get(value.__module__)
+        if module is not None and getattr(module, "__file__", None):
+            files |= {str(module.__file__)} | _files_compiled_in(vars(module), seen)
+    return files
+
+
+def _numbers(values: Mapping[str, Any]) -> tuple[tuple[str, str], ...]:
+    """Names and values of a module's numbers, and of tuples of them."""
+    kinds = int, float, np.generic
+    found = []
+    for name, value in values.items():
+        parts = value if isinstance(value, tuple) else (value,)
+        if parts and all(isinstance(part, kinds) for part in parts):
+            found.append((name, repr(value)))
+    return tuple(sorted(found))
+
+
+def _status(file: str) -> os.stat_result | None:
+    """Of a file; None where it cannot be had, as in an archive."""
+    with suppress(OSError):
+        return os.stat(file)
+    return None
 
 
 def _forgive(dispatcher: Any) -> None:

@@ -93,6 +93,11 @@ def test_what_makes_a_page_holds_the_sensor_every_effect_the_templates_and_no_co
     from spikecam_env.sensor import CATALOGUE
 
     found = {p.relative_to(this.ROOT).as_posix() for p in sources_of(MADE_BY)}
-    assert {"sensor/reference.py", "gap/screen/templates.npz", "sensor/presets/scsim.toml", "page.html.jinja"} <= found
+    assert {
+        "sensor/engines/reference.py",
+        "gap/screen/templates.npz",
+        "sensor/presets/scsim.toml",
+        "page.html.jinja",
+    } <= found
     assert {f"sensor/effects/{name}.py" for name in CATALOGUE} <= found
     assert not [p for p in found if p.startswith(("cli/", "envs/", "datasets/", "bench"))]

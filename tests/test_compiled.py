@@ -197,3 +197,37 @@ def test_without_compiling_the_sensor_s_specification_runs_and_the_fast_engine_s
     environment = os.environ | {"NUMBA_DISABLE_JIT": "1"}
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, env=environment, timeout=120)
     assert done.stdout.startswith("True\n") and "not usable in pure-python" in done.stdout, done.stderr
+
+
+LAW = "from spikecam_env.compiled import njit\n\n@njit(inline='always')\ndef law(x):\n    return x + {step}\n"
+CALLER = """
+import numpy as np
+from law import law
+from spikecam_env.compiled import njit
+from sizes import SIZE
+
+@njit(cache=True)
+def total(x):
+    return law(x) * SIZE
+
+print(total(1), sum(total.stats.cache_hits.values()))
+"""
+
+
+def test_kept_code_is_stale_when_a_file_or_a_number_that_it_is_compiled_with_has_changed(tmp_path: Path) -> None:
+    """numba by itself looks only at the file of the function."""
+    (tmp_path / "caller.py").write_text(CALLER)
+
+    def printed(step: int, size: int) -> str:
+        for name, text in (("law.py", LAW.format(step=step)), ("sizes.py", f"SIZE = {size}\n")):
+            if not (tmp_path / name).exists() or (tmp_path / name).read_text() != text:
+                (tmp_path / name).write_text(text)
+        environment = {**os.environ, "PYTHONPATH": str(ROOT), "PYTHONDONTWRITEBYTECODE": "1"}
+        environment.pop("NUMBA_CACHE_DIR", None)
+        asked = [sys.executable, "-c", "import caller"]
+        return subprocess.run(asked, cwd=tmp_path, env=environment, capture_output=True, text=True, check=True).stdout
+
+    assert printed(step=1, size=10) == "20 0\n"
+    assert printed(step=2, size=10) == "30 0\n"
+    assert printed(step=2, size=7) == "21 0\n"
+    assert printed(step=2, size=7) == "21 1\n", "kept while nothing has changed"

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from torch import Tensor
 
 from spikecam_env.compiled import njit
-from spikecam_env.sensor.compiled_tools.intrinsics import instruction
+from spikecam_env.sensor.ground.intrinsics import instruction
 
 _LOG2_E, _LN_2 = np.float32(1 / math.log(2)), np.float32(math.log(2))
 _SERIES = tuple(np.float32(math.log(2) ** n / math.factorial(n)) for n in range(7))

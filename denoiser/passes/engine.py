@@ -31,7 +31,7 @@ from denoiser.passes.window import PassWindow, RollingWindow
 from spikecam_env.calibration import Calibration
 from spikecam_env.checked import checked_count, checked_whole
 from spikecam_env.errors import InputError, unknown_name
-from spikecam_env.sensor.kernels.cuda import checked_device
+from spikecam_env.sensor.engines.gpu import checked_device
 from spikecam_env.types import Pictures
 
 ENGINES = ("torch", "captured")

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from denoiser.passes.window import WINDOW_PRIOR
 from spikecam_env.compiled import njit
-from spikecam_env.sensor.compiled_tools.intrinsics import use_widest_vectors
+from spikecam_env.sensor.ground.intrinsics import use_widest_vectors
 from spikecam_env.streams.bits import highest, lowest, ones, transpose
 
 OLDEST = 1 << 20

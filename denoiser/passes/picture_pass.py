@@ -27,7 +27,7 @@ from denoiser.passes.infer import Carried, stacked
 from denoiser.passes.pixel_history import PictureInput
 from spikecam_env.compiled import njit
 from spikecam_env.own_code import own_code
-from spikecam_env.sensor.compiled_tools.intrinsics import use_widest_vectors
+from spikecam_env.sensor.ground.intrinsics import use_widest_vectors
 from spikecam_env.types import Pictures
 
 Floats: TypeAlias = NDArray[np.float32]

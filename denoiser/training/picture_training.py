@@ -45,7 +45,7 @@ from scenes.flat.planes import painted_planes
 from scenes.protocol import Gaze
 from scenes.textures import Texture
 from spikecam_env.sensor import Keyframes, SpikeSensor
-from spikecam_env.sensor.kernels import fast
+from spikecam_env.sensor.engines.compiled import fast
 from spikecam_env.sensor.light import GRAINS
 from spikecam_env.streams.packing import pack_frames, unpack_frames
 from spikecam_env.types import Floats, Pictures, Spikes

@@ -25,8 +25,9 @@ from denoiser.training.pairs import TRAINING_KINDS, draw_model
 from scenes.flat.collage import depths
 from scenes.textures import random_texture
 from spikecam_env.errors import InputError
-from spikecam_env.sensor.kernels import cuda, fast
-from spikecam_env.sensor.kernels.cuda.state import BatchLaw, BatchSegment, BatchState
+from spikecam_env.sensor.engines import gpu
+from spikecam_env.sensor.engines.compiled import fast
+from spikecam_env.sensor.engines.gpu.state import BatchLaw, BatchSegment, BatchState
 from spikecam_env.sensor.light import GRAINS
 
 TWINS = ("noisy", "clean")
@@ -244,7 +245,7 @@ class SimulatedStreams:
         spikes = torch.empty((count, keys - 1, light.shape[2]), dtype=torch.uint8, device=self.device)
         for k in range(keys - 1):
             segment = BatchSegment(light[:, k].contiguous(), light[:, k + 1].contiguous(), self._timing, self._half, 1)
-            cuda.run(state, segment, spikes[:, k : k + 1])
+            gpu.run(state, segment, spikes[:, k : k + 1])
         mine[f"{twin} remaining"], mine[f"{twin} fired"] = state.remaining, state.fired
         return spikes.reshape(count, keys - 1, self.patch, self.patch)
 

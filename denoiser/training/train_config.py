@@ -20,7 +20,7 @@ from denoiser.training.training_source import TrainingSource
 from denoiser.weights import AnyRecipe
 from spikecam_env.errors import InputError, unknown_name
 from spikecam_env.numbers import MOST_WORKERS, Range, WholeRange
-from spikecam_env.sensor.kernels.cuda import checked_device
+from spikecam_env.sensor.engines.gpu import checked_device
 
 SOURCES: dict[str, type[TrainingSource]] = {
     "best": Rollouts,

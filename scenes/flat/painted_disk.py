@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from spikecam_env.checked import checked_memory
 from spikecam_env.compiled import njit
-from spikecam_env.sensor.compiled_tools.intrinsics import pointer_to, take_ticket, two_at, use_widest_vectors
+from spikecam_env.sensor.ground.intrinsics import pointer_to, take_ticket, two_at, use_widest_vectors
 from spikecam_env.types import Floats, Pictures
 
 TEXELS_PER_PIXEL = 5

@@ -18,7 +18,7 @@ from scenes.flat.painted_disk import PlacedDisc, Plane, Texels, Tile, paint_scen
 from scenes.keys import AT_REST, interval_for, key_frames, threads_for
 from scenes.protocol import Gaze, Truth
 from spikecam_env.sensor import Keyframes
-from spikecam_env.sensor.compiled_tools.intrinsics import address_of
+from spikecam_env.sensor.ground.intrinsics import address_of
 from spikecam_env.threads import together
 from spikecam_env.types import Floats, Pictures
 

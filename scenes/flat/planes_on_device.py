@@ -18,7 +18,7 @@ from torch.nn.functional import grid_sample
 
 from scenes.flat.painted_disk import PlacedDisc, Plane, Texels, places_of
 from spikecam_env.sensor import Keyframes
-from spikecam_env.sensor.kernels.cuda import checked_device
+from spikecam_env.sensor.engines.gpu import checked_device
 from spikecam_env.types import Floats, Pictures
 
 TOGETHER = 1 << 25

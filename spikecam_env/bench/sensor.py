@@ -16,9 +16,9 @@ from numpy.typing import NDArray
 from tqdm import tqdm
 
 from spikecam_env.bench.machine import FRAME_RATE_HZ, SHAPE
-from spikecam_env.sensor import reference
 from spikecam_env.sensor.effects.base import ExposureBlock
-from spikecam_env.sensor.kernels import ahead, fast
+from spikecam_env.sensor.engines import reference
+from spikecam_env.sensor.engines.compiled import ahead, fast
 from spikecam_env.sensor.light import GRAINS, Keyframes, Segment, ramp, segments
 from spikecam_env.sensor.model import SensorModel, generator
 from spikecam_env.sensor.unit import Unit

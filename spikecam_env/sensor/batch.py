@@ -13,8 +13,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from spikecam_env.checked import checked_count, checked_seed, checked_shape, checked_whole
 from spikecam_env.errors import InputError, shown
+from spikecam_env.sensor.engines import gpu
 from spikecam_env.sensor.imaging import Imaging
-from spikecam_env.sensor.kernels import cuda
 from spikecam_env.sensor.light import (
     MAX_SEGMENT,
     Keyframes,
@@ -48,7 +48,7 @@ class SensorBatchState:
     """Each camera's next (B,)."""
     phase: Floats
     """(B, H, W)."""
-    pixels: cuda.BatchState
+    pixels: gpu.BatchState
 
 
 class SpikeSensorBatch:
@@ -79,8 +79,8 @@ class SpikeSensorBatch:
         seeds: Sequence[int] = (0,),
         device: str | torch.device = "cuda",
     ) -> None:
-        self.device = cuda.checked_device(device)
-        self.kernel = cuda.kernel_on(self.device)
+        self.device = gpu.checked_device(device)
+        self.kernel = gpu.kernel_on(self.device)
         self.shape = checked_shape(shape)
         self.seeds = _checked_seeds(seeds)
         self.models = _checked_models(models, len(self.seeds))
@@ -120,7 +120,7 @@ class SpikeSensorBatch:
         spikes = torch.empty((len(self), frames, self._pixels.pixels), dtype=torch.uint8, device=self.device)
         done = 0
         for piece in pieces:
-            cuda.run(self._pixels, piece, spikes[:, done : done + piece.count])
+            gpu.run(self._pixels, piece, spikes[:, done : done + piece.count])
             done += piece.count
         self.frame += frames
         return spikes.reshape(len(self), frames, *self.shape)
@@ -199,12 +199,12 @@ class SpikeSensorBatch:
         twin._pixels = twin._started(range(len(twin)))
         return twin
 
-    def _started(self, cameras: Sequence[int] | NDArray[np.int64]) -> cuda.BatchState:
+    def _started(self, cameras: Sequence[int] | NDArray[np.int64]) -> gpu.BatchState:
         units = [self.models[b].draw_unit(self.shape, self.seeds[b]) for b in cameras]
         phases = [self.phase[b].reshape(-1) for b in cameras]
-        return cuda.start(units, phases, [self.seeds[b] for b in cameras], self.device)
+        return gpu.start(units, phases, [self.seeds[b] for b in cameras], self.device)
 
-    def _pieces(self, radiance: Any, frames: int) -> Iterator[cuda.BatchSegment]:
+    def _pieces(self, radiance: Any, frames: int) -> Iterator[gpu.BatchSegment]:
         """The light of the next frames, checked before any is exposed, cut into segments of one kernel call."""
         if isinstance(radiance, Keyframes) and self._alike and np.all(self.frame == self.frame[0]):
             return self._moving([as_light(radiance, self.shape)], frames)
@@ -216,7 +216,7 @@ class SpikeSensorBatch:
             return self._moving([as_light(light, self.shape) for light in radiance], frames)
         return self._still(self._checked_pictures(radiance), frames)
 
-    def _moving(self, lights: Sequence[Keyframes | Pictures], frames: int) -> Iterator[cuda.BatchSegment]:
+    def _moving(self, lights: Sequence[Keyframes | Pictures], frames: int) -> Iterator[gpu.BatchSegment]:
         for light, at in zip(lights, self.frame, strict=False):
             if not any(light is film for film in self._films):
                 warn_outside(light, int(at), frames)
@@ -227,16 +227,16 @@ class SpikeSensorBatch:
                 imaging.segment_image(_on_host(s)) if imaging else s
                 for imaging, s in zip(self._imaging, cut, strict=False)
             ]
-            yield cuda.BatchSegment.of(images, self.device)
+            yield gpu.BatchSegment.of(images, self.device)
 
-    def _still(self, pictures: torch.Tensor, frames: int) -> Iterator[cuda.BatchSegment]:
+    def _still(self, pictures: torch.Tensor, frames: int) -> Iterator[gpu.BatchSegment]:
         """Segments of held light (B, H, W) or (1, H, W)."""
         light = pictures.reshape(len(pictures), -1)
         if any(self._imaging):
             light = torch.from_numpy(self._images(light.cpu().numpy()))
         light = light.to(self.device)
         for done in range(0, frames, MAX_SEGMENT):
-            yield cuda.BatchSegment.held(light, min(MAX_SEGMENT, frames - done))
+            yield gpu.BatchSegment.held(light, min(MAX_SEGMENT, frames - done))
 
     def _images(self, light: Pictures) -> Pictures:
         """Held light (B, P) or (1, P) through each camera's optics."""
@@ -302,7 +302,7 @@ def _checked_models(models: Any, cameras: int) -> tuple[SensorModel, ...]:
         raise InputError(f"{len(given)} models for {cameras} seeds; give one model a seed, or one for all")
     loaded = tuple(model if isinstance(model, SensorModel) else SensorModel.load(model) for model in given)
     for model in loaded:
-        missing = cuda.missing(model.effects)
+        missing = gpu.missing(model.effects)
         if missing:
             raise InputError(f"the cuda engine does not carry {', '.join(missing)}; use SpikeSensor, engine='auto'")
     return loaded

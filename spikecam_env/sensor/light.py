@@ -32,7 +32,7 @@ from numpy.typing import ArrayLike, NDArray
 from spikecam_env.compiled import njit
 from spikecam_env.errors import InputError
 from spikecam_env.sensor.between_keys import key_weights
-from spikecam_env.sensor.compiled_tools.intrinsics import use_widest_vectors
+from spikecam_env.sensor.ground.intrinsics import use_widest_vectors
 from spikecam_env.types import Floats, Pictures
 
 GRAINS = 1 << 23

@@ -16,11 +16,11 @@ from numpy.typing import ArrayLike
 from spikecam_env.checked import LARGEST_DERIVED_SEED, checked_count, checked_seed, checked_shape
 from spikecam_env.errors import InputError, shown, unknown_name
 from spikecam_env.sensor import bent_light as bent
-from spikecam_env.sensor import reference
 from spikecam_env.sensor.drive import wants_pieces
 from spikecam_env.sensor.effects.base import ExposureBlock
+from spikecam_env.sensor.engines import reference
+from spikecam_env.sensor.engines.compiled import ahead, block, fast
 from spikecam_env.sensor.imaging import Imaging
-from spikecam_env.sensor.kernels import ahead, block, fast
 from spikecam_env.sensor.light import Keyframes, Segment, as_light, real_numbers, segments, warn_outside
 from spikecam_env.sensor.model import SensorModel, generator
 from spikecam_env.sensor.unit import UNIT_RANGES, Unit
@@ -190,8 +190,8 @@ class SpikeSensor:
         elif self.engine == "fast":
             self._pixels = block.start(self._first_exposure(), self._frame_effects, flat, noise_seed, unit_seed)
         elif self.engine == "cuda":
-            cuda = _cuda()
-            self._pixels = cuda.start([self.unit], [flat], [noise_seed], cuda.checked_device("cuda"))
+            gpu = _gpu()
+            self._pixels = gpu.start([self.unit], [flat], [noise_seed], gpu.checked_device("cuda"))
         else:
             self._pixels = reference.start(self._first_exposure(), self._frame_effects, flat, noise_seed, unit_seed)
 
@@ -237,9 +237,9 @@ class SpikeSensor:
         if self.engine == "fast":
             ahead.run(self._pixels, segment, out, threads=self.threads)
         elif self.engine == "cuda":
-            cuda = _cuda()
-            batch = cuda.BatchSegment.of([segment], self._pixels.device)
-            out[:] = cuda.run(self._pixels, batch)[0].cpu().numpy()
+            gpu = _gpu()
+            batch = gpu.BatchSegment.of([segment], self._pixels.device)
+            out[:] = gpu.run(self._pixels, batch)[0].cpu().numpy()
         else:
             out[:] = reference.run(self._first_exposure(), self._frame_effects, self._pixels, segment)
 
@@ -375,10 +375,10 @@ def _chosen_engine(engine: str, model: SensorModel, unit: Unit | None) -> str:
     if engine in ("cuda", "fast") and missing:
         raise InputError(f"the {engine} engine does not carry {', '.join(missing)}; use engine='reference' or 'auto'")
     if engine == "cuda":
-        _cuda().checked_device("cuda")
+        _gpu().checked_device("cuda")
     return engine
 
 
-def _cuda() -> ModuleType:
+def _gpu() -> ModuleType:
     """The module, imported when first needed: torch takes seconds."""
-    return import_module("spikecam_env.sensor.kernels.cuda")
+    return import_module("spikecam_env.sensor.engines.gpu")

@@ -13,7 +13,7 @@ from denoiser.passes.recipe import RECIPES
 from denoiser.training.simulated import AGES, SHAPES, SPEEDS, TWINS, Bank, SimulatedStreams
 from scenes.catalogue import make_scene
 from spikecam_env.errors import InputError
-from spikecam_env.sensor.kernels import fast
+from spikecam_env.sensor.engines.compiled import fast
 from spikecam_env.sensor.light import Segment
 
 COUNT, PATCH = 12, 32

@@ -16,10 +16,10 @@ from benchmarks.agreement import compare, observe
 from spikecam_env.errors import InputError
 from spikecam_env.sensor import CATALOGUE, Effect, SensorModel, SpikeSensor, Stage, Unit
 from spikecam_env.sensor.effects.base import Charge, ExposureBlock, parameter
-from spikecam_env.sensor.kernels import block, block_loop
+from spikecam_env.sensor.engines.compiled import block, block_loop
+from spikecam_env.sensor.ground.random_fields import white_field, words
 from spikecam_env.sensor.light import Segment
 from spikecam_env.sensor.model import generator
-from spikecam_env.sensor.random_fields import white_field, words
 from spikecam_env.types import Floats, Masks
 
 pytestmark = pytest.mark.slow

@@ -14,7 +14,8 @@ from numpy.typing import NDArray
 
 from spikecam_env.errors import InputError
 from spikecam_env.sensor import CATALOGUE, Keyframes, SensorModel, SpikeSensor, SpikeSensorBatch
-from spikecam_env.sensor.kernels import cuda, fast
+from spikecam_env.sensor.engines import gpu
+from spikecam_env.sensor.engines.compiled import fast
 from spikecam_env.sensor.light import Segment
 from spikecam_env.sensor.model import generator
 
@@ -59,12 +60,12 @@ def test_pixels_and_their_state_are_those_of_the_fast_engine(preset: str, pixels
     model = SensorModel.preset(preset)
     units = [model.draw_unit((1, pixels), seed) for seed in SEEDS]
     phases = [generator(seed, "phase").random(pixels) for seed in SEEDS]
-    ours = cuda.start(units, phases, SEEDS, CPU)
+    ours = gpu.start(units, phases, SEEDS, CPU)
     theirs = [fast.start(*one) for one in zip(units, phases, SEEDS, strict=True)]
     for key, (length, first, count) in enumerate([(64, 0, 64), (64, 5, 1), (7, 3, 4), (50, 17, 33), (1, 0, 1)]):
         light = wild_film(150, key, (3, pixels)).radiance
         segments = [Segment(light[0, b], light[1, b], length, first, count) for b in range(3)]
-        spikes = cuda.run(ours, cuda.BatchSegment.of(segments, CPU))
+        spikes = gpu.run(ours, gpu.BatchSegment.of(segments, CPU))
         equal(spikes, np.stack([fast.run(state, segment) for state, segment in zip(theirs, segments, strict=True)]))
     for b, state in enumerate(theirs):
         np.testing.assert_array_equal(ours.remaining[b], state.remaining[:pixels])
@@ -172,7 +173,7 @@ def test_clean_twins_are_those_of_the_fast_cameras() -> None:
 
 def test_one_camera_by_the_cuda_engine_is_the_fast_camera(monkeypatch: pytest.MonkeyPatch) -> None:
     """SpikeSensor's own face; the processor stands in for the GPU."""
-    monkeypatch.setattr(cuda, "checked_device", lambda device: CPU)
+    monkeypatch.setattr(gpu, "checked_device", lambda device: CPU)
     film = wild_film(25, 0)
     sensor = SpikeSensor("scsim", SHAPE, 3, engine="cuda", take=2)
     other = SpikeSensor("scsim", SHAPE, 3, engine="fast", take=2)

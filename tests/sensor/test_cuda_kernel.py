@@ -19,8 +19,8 @@ import pytest
 import torch
 
 from spikecam_env.sensor import SensorModel
-from spikecam_env.sensor.kernels import cuda
-from spikecam_env.sensor.kernels.cuda import dense
+from spikecam_env.sensor.engines import gpu
+from spikecam_env.sensor.engines.gpu import dense
 from spikecam_env.sensor.light import Segment
 from spikecam_env.sensor.model import generator
 
@@ -41,7 +41,7 @@ def jump() -> ModuleType:
 
     if DEVICE.type == "cpu" and _version(triton) < (3, 9) and _version(np) >= (2, 4):
         pytest.skip(f"the interpreter of triton {triton.__version__} does not run under numpy {np.__version__}")
-    from spikecam_env.sensor.kernels.cuda import jump
+    from spikecam_env.sensor.engines.gpu import jump
 
     return jump
 
@@ -50,10 +50,10 @@ def _version(module: ModuleType) -> tuple[int, ...]:
     return tuple(int(number) for number in module.__version__.split(".")[:2])
 
 
-def started(pixels: int, preset: str) -> cuda.BatchState:
+def started(pixels: int, preset: str) -> gpu.BatchState:
     model = SensorModel.preset(preset)
     units = [model.draw_unit((1, pixels), seed) for seed in SEEDS]
-    return cuda.start(units, [generator(seed, "phase").random(pixels) for seed in SEEDS], SEEDS, DEVICE)
+    return gpu.start(units, [generator(seed, "phase").random(pixels) for seed in SEEDS], SEEDS, DEVICE)
 
 
 def light(pixels: int, low: float, high: float) -> np.ndarray:
@@ -65,7 +65,7 @@ def light(pixels: int, low: float, high: float) -> np.ndarray:
     return film
 
 
-def same(jump: ModuleType, state: cuda.BatchState, segment: cuda.BatchSegment) -> None:
+def same(jump: ModuleType, state: gpu.BatchState, segment: gpu.BatchSegment) -> None:
     """Both kernels on copies of `state`: same spikes, same state after."""
     ours, theirs = copy.deepcopy(state), copy.deepcopy(state)
     shape = (state.cameras, segment.count + 2, state.pixels)
@@ -92,14 +92,14 @@ def test_the_triton_kernel_gives_the_bits_of_the_torch_one(
     """Each camera in a key interval of its own (length, first, count): ramps, bright and dim, blocks not filled."""
     film = light(pixels, low, high)
     segments = [Segment(film[0, b], film[1, b], *intervals[b]) for b in range(2)]
-    same(jump, started(pixels, "scsim"), cuda.BatchSegment.of(segments, DEVICE))
+    same(jump, started(pixels, "scsim"), gpu.BatchSegment.of(segments, DEVICE))
 
 
 def test_the_triton_kernel_takes_light_that_all_cameras_share(jump: ModuleType) -> None:
     film = light(40, 0.02, 0.5)
-    shared = cuda.BatchSegment.of([Segment(film[0, 0], film[1, 0], 64, 0, 20)], DEVICE)
+    shared = gpu.BatchSegment.of([Segment(film[0, 0], film[1, 0], 64, 0, 20)], DEVICE)
     same(jump, started(40, "physical"), shared)
-    held = cuda.BatchSegment.held(torch.from_numpy(film[0]).to(DEVICE), 20)
+    held = gpu.BatchSegment.held(torch.from_numpy(film[0]).to(DEVICE), 20)
     same(jump, started(40, "ideal"), held)
 
 
@@ -107,7 +107,7 @@ COMPILE = """
 from triton import compile
 from triton.backends.compiler import GPUTarget
 from triton.compiler import ASTSource
-from spikecam_env.sensor.kernels.cuda import jump
+from spikecam_env.sensor.engines.gpu import jump
 
 floats = dict.fromkeys(("radiance0", "radiance1", "per_twice", "gain", "dark", "spread", "polynomial"), "*fp32")
 whole = dict.fromkeys(("timing", "seeds", "remaining", "fired"), "*i32")

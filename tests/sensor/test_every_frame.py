@@ -2,20 +2,15 @@
 
 from __future__ import annotations
 
-import inspect
-import zlib
 from itertools import pairwise
-from types import ModuleType
 
 import numpy as np
 import pytest
 from laws import jittered
 from numpy.typing import NDArray
 
-from spikecam_env.sensor import Keyframes, SensorModel, SpikeSensor, crossing, decay, random_fields
-from spikecam_env.sensor.compiled_tools import draws
-from spikecam_env.sensor.event_camera import loop as event_loop
-from spikecam_env.sensor.kernels import block_loop, every_frame, fast, loop
+from spikecam_env.sensor import Keyframes, SensorModel, SpikeSensor
+from spikecam_env.sensor.engines.compiled import fast
 from spikecam_env.sensor.light import Segment
 
 MODELS = {
@@ -87,21 +82,3 @@ def test_threads_and_cameras_of_both_kinds_in_a_call_change_no_bit() -> None:
     packed = np.empty((40, 625), np.uint8)
     fast._advance([fast.Stretch.of(fast.start(unit, phase, 1), quick, packed)], [packed], True, None)
     assert np.array_equal(np.unpackbits(packed, axis=1, bitorder="little"), alone[0])
-
-
-@pytest.mark.parametrize(
-    "kernel, name, source",
-    [
-        (loop, "DRAWS", draws),
-        (random_fields, "DRAWS", draws),
-        (block_loop, "DRAWS", draws),
-        (event_loop, "DRAWS", draws),
-        (block_loop, "DECAY", decay),
-        (block_loop, "CROSSING", crossing),
-        (every_frame, "LOOP", loop),
-    ],
-)
-def test_a_kernel_names_the_file_that_it_is_compiled_with(kernel: ModuleType, name: str, source: ModuleType) -> None:
-    """Numba's cache sees a change of the file it compiles, not of one that it imports from."""
-    now = zlib.crc32(inspect.getsource(source).encode())
-    assert now == getattr(kernel, name), f"{source.__name__} has changed: write {name} = {now:#x} in {kernel.__file__}"

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from spikecam_env.errors import InputError
 from spikecam_env.sensor import CATALOGUE, SensorModel, SpikeSensor
-from spikecam_env.sensor.kernels import ahead, fast
+from spikecam_env.sensor.engines.compiled import ahead, fast
 from spikecam_env.sensor.light import GRAINS, Segment, ramp
 from spikecam_env.sensor.model import generator
 
@@ -118,7 +118,7 @@ def test_an_already_passed_threshold_fires_in_the_first_lit_frame() -> None:
 
 
 def test_inputs_that_cannot_be_written_to_compile_nothing_new() -> None:
-    from spikecam_env.sensor.kernels import loop
+    from spikecam_env.sensor.engines.compiled import loop
 
     light = wild_light(300)
     fast.run(started(300), Segment(light[0], light[1], 64, 0, 64))

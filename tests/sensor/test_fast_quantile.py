@@ -11,9 +11,9 @@ from numpy.typing import NDArray
 from scipy import special, stats
 
 from spikecam_env.sensor import SensorModel
-from spikecam_env.sensor.compiled_tools import draws
-from spikecam_env.sensor.compiled_tools.quantile import bell_cdf, charge_cdf, fitted_polynomial
-from spikecam_env.sensor.kernels import fast
+from spikecam_env.sensor.engines.compiled import fast
+from spikecam_env.sensor.ground import draws
+from spikecam_env.sensor.ground.quantile import bell_cdf, charge_cdf, fitted_polynomial
 
 
 def polynomial_at(x: NDArray[np.float64], electrons: float, kappa: float) -> NDArray[np.float64]:

@@ -13,7 +13,7 @@ import pytest
 
 from spikecam_env.errors import InputError
 from spikecam_env.sensor import CATALOGUE, Circuit, Keyframes, SensorModel, SpikeSensor
-from spikecam_env.sensor.kernels import block, fast
+from spikecam_env.sensor.engines.compiled import block, fast
 from spikecam_env.threads import together
 
 ENGINES = ("reference", "fast")

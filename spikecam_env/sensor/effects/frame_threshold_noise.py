@@ -16,7 +16,7 @@ import numpy as np
 
 from spikecam_env.sensor.effects.base import Acts, Effect, ExposureBlock, Shift, Stage, parameter
 from spikecam_env.sensor.effects.identification import Identification, Needs, Response
-from spikecam_env.sensor.random_fields import Words, white_field, words
+from spikecam_env.sensor.ground.random_fields import Words, white_field, words
 
 
 @dataclass(frozen=True)

@@ -16,9 +16,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from spikecam_env.sensor.decay import LONG, decayed
 from spikecam_env.sensor.effects.base import Acts, Effect, ExposureBlock, Feedback, Stage, parameter
 from spikecam_env.sensor.effects.identification import Identification, Needs
+from spikecam_env.sensor.ground.decay import LONG, decayed
 from spikecam_env.types import Floats, Masks
 
 

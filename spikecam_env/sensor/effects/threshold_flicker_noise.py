@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from spikecam_env.sensor.effects.base import Acts, Effect, ExposureBlock, Shift, Stage, parameter
 from spikecam_env.sensor.effects.identification import Identification, Needs, Response
-from spikecam_env.sensor.random_fields import Words, octave_field, words
+from spikecam_env.sensor.ground.random_fields import Words, octave_field, words
 
 
 class Octaves(NamedTuple):

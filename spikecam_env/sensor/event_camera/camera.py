@@ -12,9 +12,9 @@ from spikecam_env.errors import InputError, shown
 from spikecam_env.sensor.event_camera.event_list import EventList
 from spikecam_env.sensor.event_camera.loop import Pixels, Thresholds, expose, first_waits
 from spikecam_env.sensor.event_camera.pixel import EventPixel
+from spikecam_env.sensor.ground.random_fields import Words, words
 from spikecam_env.sensor.light import Keyframes, as_light
 from spikecam_env.sensor.model import generator
-from spikecam_env.sensor.random_fields import Words, words
 
 
 @dataclass(frozen=True)

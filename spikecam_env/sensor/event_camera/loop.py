@@ -17,13 +17,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from spikecam_env.compiled import njit
-from spikecam_env.sensor.compiled_tools.draws import GOLDEN, first_key, scramble, second_key
 from spikecam_env.sensor.event_camera.pixel import Law
+from spikecam_env.sensor.ground.draws import GOLDEN, first_key, scramble, second_key
 from spikecam_env.sensor.light import INSTANT
 from spikecam_env.types import Floats, Pictures
-
-DRAWS = 0x98AA1746
-"""Checksum of the draws compiled in: numba's cache sees a change of this file, not of those it imports from."""
 
 NEVER = np.inf
 

@@ -17,7 +17,7 @@ from spikecam_env.errors import InputError
 from spikecam_env.sensor import CATALOGUE, Keyframes, SensorModel, SpikeSensor
 from spikecam_env.sensor.effect_sheet import SECTIONS, Sheet
 from spikecam_env.sensor.effects.base import Charge, Few
-from spikecam_env.sensor.kernels import block
+from spikecam_env.sensor.engines.compiled import block
 from tools import effects_page
 
 SHAPE = (10, 12)

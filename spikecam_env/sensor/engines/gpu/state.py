@@ -14,7 +14,7 @@ import numpy as np
 import torch
 from numpy.typing import NDArray
 
-from spikecam_env.sensor.kernels import fast
+from spikecam_env.sensor.engines.compiled import fast
 from spikecam_env.sensor.light import Segment
 from spikecam_env.sensor.unit import Unit
 from spikecam_env.types import Floats, Pictures

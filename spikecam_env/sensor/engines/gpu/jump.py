@@ -12,7 +12,7 @@ import torch
 import triton
 import triton.language as tl
 
-from spikecam_env.sensor.kernels.cuda.state import BatchSegment, BatchState
+from spikecam_env.sensor.engines.gpu.state import BatchSegment, BatchState
 from spikecam_env.sensor.light import GRAINS, MAX_GRAINS_PER_FRAME, MAX_SEGMENT
 
 BLOCK = 128

@@ -30,9 +30,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from spikecam_env.compiled import njit
-from spikecam_env.sensor.compiled_tools.draws import GOLDEN, first_key, second_key, standard
-from spikecam_env.sensor.crossing import MOST_AGAIN, NEVER, crossing_between
-from spikecam_env.sensor.decay import LONG, decayed
+from spikecam_env.sensor.ground.crossing import MOST_AGAIN, NEVER, crossing_between
+from spikecam_env.sensor.ground.decay import LONG, decayed
+from spikecam_env.sensor.ground.draws import GOLDEN, first_key, second_key, standard
 from spikecam_env.sensor.light import GRAINS, LEAST_LIMIT, MOST_GRAINS
 from spikecam_env.sensor.light import on_grid as rounded
 from spikecam_env.types import Floats, Pictures
@@ -73,9 +73,6 @@ SLOTS = 2
 
 FEW_WAIT = 16
 """Most pixels of one slot that are searched for the next, each time; more go through a heap."""
-
-DRAWS, DECAY, CROSSING = 0x98AA1746, 0xB1E4BA7D, 0xD8275A88
-"""Checksums of files compiled in: numba's cache sees a change of this file, not of those it imports from."""
 
 decay = njit(inline="always")(decayed)
 on_grid = njit(inline="always")(rounded)

@@ -14,7 +14,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from spikecam_env.sensor.kernels import fast
+from spikecam_env.sensor.engines.compiled import fast
 from spikecam_env.sensor.light import MAX_SEGMENT, Segment, same_light
 from spikecam_env.sensor.unit import Unit
 from spikecam_env.types import Floats, Spikes

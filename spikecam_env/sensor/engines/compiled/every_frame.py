@@ -19,8 +19,7 @@ from numba.np.numpy_support import carray
 from numpy.typing import NDArray
 
 from spikecam_env.compiled import njit
-from spikecam_env.sensor.compiled_tools.intrinsics import pointer_to, prefetch, take_ticket, use_widest_vectors
-from spikecam_env.sensor.kernels.loop import (
+from spikecam_env.sensor.engines.compiled.loop import (
     BELL,
     CAP,
     COUNT,
@@ -66,13 +65,11 @@ from spikecam_env.sensor.kernels.loop import (
     write_bits,
     write_bytes,
 )
+from spikecam_env.sensor.ground.intrinsics import pointer_to, prefetch, take_ticket, use_widest_vectors
 from spikecam_env.sensor.light import GRAINS
 
 AT_ONCE = 4
 """Frames at a time, and charges of each pixel that are ready."""
-
-LOOP = 0x6A460E5D
-"""Checksum of `loop.py`, compiled in: numba's cache sees a change of this file, not of those it imports from."""
 
 _U = np.uint32
 _I = np.int32

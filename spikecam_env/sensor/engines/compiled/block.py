@@ -21,9 +21,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from spikecam_env.sensor import drive
-from spikecam_env.sensor.compiled_tools.quantile import MIN_ELECTRONS
 from spikecam_env.sensor.effects.base import Charge, Effect, ExposureBlock, Feedback, Few, having
-from spikecam_env.sensor.kernels import block_loop, fast, loop
+from spikecam_env.sensor.engines.compiled import block_loop, fast, loop
+from spikecam_env.sensor.ground.quantile import MIN_ELECTRONS
 from spikecam_env.sensor.light import GRAINS, Piece, Ramp, Segment, pieces_of, rise_of
 from spikecam_env.sensor.unit import Unit
 from spikecam_env.threads import as_many_as_pay, together

@@ -19,11 +19,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from spikecam_env.compiled import njit
-from spikecam_env.sensor.compiled_tools.intrinsics import address_of
-from spikecam_env.sensor.compiled_tools.quantile import MIN_ELECTRONS, fitted_polynomial
 from spikecam_env.sensor.effects import Effect
+from spikecam_env.sensor.engines.compiled import every_frame, loop
+from spikecam_env.sensor.ground.intrinsics import address_of
+from spikecam_env.sensor.ground.quantile import MIN_ELECTRONS, fitted_polynomial
 from spikecam_env.sensor.imaging import Imaging
-from spikecam_env.sensor.kernels import every_frame, loop
 from spikecam_env.sensor.light import (
     COUNT,
     FIRST,

@@ -15,9 +15,9 @@ import torch
 
 from spikecam_env.errors import InputError
 from spikecam_env.sensor.effects import Effect
-from spikecam_env.sensor.kernels import fast
-from spikecam_env.sensor.kernels.cuda import dense
-from spikecam_env.sensor.kernels.cuda.state import BatchSegment, BatchState, start
+from spikecam_env.sensor.engines.compiled import fast
+from spikecam_env.sensor.engines.gpu import dense
+from spikecam_env.sensor.engines.gpu.state import BatchSegment, BatchState, start
 
 __all__ = ["BatchSegment", "BatchState", "checked_device", "kernel_on", "missing", "run", "start"]
 
@@ -39,7 +39,7 @@ def run(state: BatchState, segment: BatchSegment, out: torch.Tensor | None = Non
     if out is None:
         out = torch.empty((state.cameras, segment.count, state.pixels), dtype=torch.uint8, device=state.device)
     if kernel_on(state.device) == "triton":
-        from spikecam_env.sensor.kernels.cuda import jump
+        from spikecam_env.sensor.engines.gpu import jump
 
         with torch.cuda.device(state.device):  # Triton launches on the current device, whatever the tensors'
             jump.advance(state, segment, out)

@@ -26,12 +26,9 @@ from numba.np.numpy_support import carray
 from numpy.typing import NDArray
 
 from spikecam_env.compiled import njit
-from spikecam_env.sensor.compiled_tools.draws import GOLDEN, bell_of, first_key, scramble, second_key
-from spikecam_env.sensor.compiled_tools.intrinsics import pointer_to, take_ticket, use_widest_vectors
+from spikecam_env.sensor.ground.draws import GOLDEN, bell_of, first_key, scramble, second_key
+from spikecam_env.sensor.ground.intrinsics import pointer_to, take_ticket, use_widest_vectors
 from spikecam_env.sensor.light import GRAINS, MAX_GRAINS_PER_FRAME, MAX_SEGMENT
-
-DRAWS = 0x98AA1746
-"""Checksum of the draws compiled in: numba's cache sees a change of this file, not of those it imports from."""
 
 TILE = 256
 """Pixels worked on between reading and writing memory; state arrays are padded to whole tiles."""

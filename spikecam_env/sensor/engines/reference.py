@@ -21,8 +21,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from spikecam_env.sensor import drive
-from spikecam_env.sensor.crossing import MOST_AGAIN, NEVER, first_crossing
 from spikecam_env.sensor.effects.base import Effect, ExposureBlock, having
+from spikecam_env.sensor.ground.crossing import MOST_AGAIN, NEVER, first_crossing
 from spikecam_env.sensor.light import GRAINS, LEAST_LIMIT, MOST_GRAINS, Piece, Segment, on_grid, ramp
 from spikecam_env.sensor.model import generator
 from spikecam_env.sensor.unit import Unit

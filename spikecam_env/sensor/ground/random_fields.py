@@ -1,7 +1,6 @@
 """Random fields: a number for every pixel and frame, a hash of both, so that no generator need be kept in step.
 
 White noise is the jump kernel's draw with the frame in the spike number's place; octaves are AR(1) processes on it.
-Numba's cache looks only at the file of the function it compiles: see `DRAWS`.
 """
 
 from __future__ import annotations
@@ -12,16 +11,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from spikecam_env.compiled import njit
-from spikecam_env.sensor.compiled_tools.draws import GOLDEN, first_key, second_key, standard
-from spikecam_env.sensor.compiled_tools.intrinsics import use_widest_vectors
-from spikecam_env.sensor.compiled_tools.quantile import fitted_polynomial
+from spikecam_env.sensor.ground.draws import GOLDEN, first_key, second_key, standard
+from spikecam_env.sensor.ground.intrinsics import use_widest_vectors
+from spikecam_env.sensor.ground.quantile import fitted_polynomial
 from spikecam_env.types import Floats, Pictures
 
 Words = tuple[np.uint32, np.uint32]
 """The key of every draw of a field."""
-
-DRAWS = 0x98AA1746
-"""Checksum of the draws compiled in: numba's cache sees a change of this file, not of those it imports from."""
 
 TILE = 1024
 """Pixels whose keys are made once a block."""

@@ -12,7 +12,7 @@ from __future__ import annotations
 import numpy as np
 import torch
 
-from spikecam_env.sensor.kernels.cuda.state import BatchSegment, BatchState
+from spikecam_env.sensor.engines.gpu.state import BatchSegment, BatchState
 from spikecam_env.sensor.light import GRAINS, MAX_GRAINS_PER_FRAME
 
 Tensor = torch.Tensor
