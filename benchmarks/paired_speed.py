@@ -1,6 +1,9 @@
 """How fast the sensor is beside the same sensor of another checkout, in pairs of short runs.
 
-    python -m benchmarks.paired_speed OLD_CHECKOUT [MODEL ...]      a model: PRESET or PRESET+EFFECT; by default MODELS
+    python -m benchmarks.paired_speed OLD_CHECKOUT [MODEL ...]      by default MODELS
+
+A model is PRESET or PRESET+EFFECT, and @LIGHT where light is not steady: "moving" has a key each 16 frames, "new" one
+at each frame; "call" is one frame a call, each in a light of its own.
 
 Other programs on a machine slow a run by tens of per cent, and both of a pair by much the same.  One process a checkout
 does the same steps in turn, both on one core.  The process's own CPU time is compared.  ratio: the median over pairs of
@@ -21,7 +24,11 @@ from numpy.typing import NDArray
 from spikecam_env.bench.machine import machine
 from spikecam_env.cli.table import table
 
-MODELS = ("ideal", "scsim", "physical", "scsim+dead_time", "scsim+ir_drop", "scsim+row_temporal_noise")
+MODELS = (
+    *("ideal", "scsim", "physical", "scsim+dead_time", "scsim+ir_drop", "scsim+row_temporal_noise"),
+    *("scsim+photodiode_lag", "scsim+incomplete_reset", "scsim+blooming", "scsim+clock_feedthrough", "scsim+crosstalk"),
+    *("scsim@moving", "scsim@new", "scsim@call", "scsim+dead_time@moving", "scsim+dead_time@call"),
+)
 SHAPE, LEVEL = (250, 400), 0.2
 """Rows and columns, and spikes a frame of a nominal pixel in steady light."""
 
@@ -32,20 +39,35 @@ FRAMES = 64
 WORKER = """
 import sys, time
 import numpy as np
-from spikecam_env.sensor import CATALOGUE, SensorModel, SpikeSensor
+from spikecam_env.sensor import CATALOGUE, Keyframes, SensorModel, SpikeSensor
 
-preset, *effects = sys.argv[1].split("+")
+name, _, kind = sys.argv[1].partition("@")
+preset, *effects = name.split("+")
 rows, columns, level, frames = int(sys.argv[2]), int(sys.argv[3]), float(sys.argv[4]), int(sys.argv[5])
 model = SensorModel.preset(preset)
 for name in effects:
     model = model.with_effect(CATALOGUE[name]())
 sensor = SpikeSensor(model, (rows, columns), 0, engine="fast", threads=1)
-light = np.full((rows, columns), level, dtype=np.float32)
-sensor.step(light, frames)
+every = {"moving": 16, "new": 1}.get(kind, frames)
+keys = np.arange(0.0, frames + every, every)
+pictures = np.random.default_rng(0).uniform(0.5, 1.5, (8, rows, columns)) * level
+pictures = pictures.astype(np.float32)
+light = pictures[0] if kind == "" else Keyframes(keys, pictures[np.arange(len(keys)) % 8])
+start, out = sensor.state(), np.empty((frames, rows, columns), np.uint8)
+
+def run():
+    if kind == "call":
+        for k in range(frames):
+            sensor.step(pictures[k % 8], 1, out=out[:1])
+    else:
+        sensor.step(light, frames, out=out)
+
+run()
 print("ready", flush=True)
 for _ in sys.stdin:
+    sensor.restore(start)
     begin = time.process_time()
-    sensor.step(light, frames)
+    run()
     print(time.process_time() - begin, flush=True)
 """
 
