@@ -89,7 +89,7 @@ def levels(effect: type[Effect]) -> Iterator[Effect]:
     yield effect()
     bounds = next(f.metadata["bounds"] for f in fields(effect) if f.name == effect.strength)
     if math.isinf(effect.neutral):
-            yield effect(**{effect.strength: 50.0})
+        yield effect(**{effect.strength: 50.0})
     else:
         most = min(400 * abs(getattr(effect(), effect.strength)), bounds[1] / 2)
         yield effect(**{effect.strength: most})

@@ -118,15 +118,15 @@ def test_an_already_passed_threshold_fires_in_the_first_lit_frame() -> None:
 
 
 def test_inputs_that_cannot_be_written_to_compile_nothing_new() -> None:
-    from spikecam_env.sensor.engines.compiled import loop
+    from spikecam_env.sensor.engines.compiled import tile_driver
 
     light = wild_light(300)
     fast.run(started(300), Segment(light[0], light[1], 64, 0, 64))
-    known = len(loop.advance.signatures)
+    known = len(tile_driver.advance.signatures)
     light.flags.writeable = False
     fast.run(started(300), Segment(light[0], light[1], 64, 0, 64))
     fast.run(started(150), Segment(light[0, ::2], light[1, ::2], 64, 0, 64))
-    assert len(loop.advance.signatures) == known
+    assert len(tile_driver.advance.signatures) == known
 
 
 def _count_spikes(queue: multiprocessing.Queue[int]) -> None:

@@ -22,7 +22,8 @@ from numpy.typing import NDArray
 
 from spikecam_env.sensor import drive
 from spikecam_env.sensor.effects.base import Charge, Effect, ExposureBlock, Feedback, Few, having
-from spikecam_env.sensor.engines.compiled import block_loop, fast, loop
+from spikecam_env.sensor.engines.compiled import block_loop, fast
+from spikecam_env.sensor.engines.compiled.tile import ramp
 from spikecam_env.sensor.ground.quantile import MIN_ELECTRONS
 from spikecam_env.sensor.light import GRAINS, Piece, Ramp, Segment, pieces_of, rise_of
 from spikecam_env.sensor.unit import Unit
@@ -185,7 +186,7 @@ def _parts(law: BlockLaw, segments: Iterable[Segment], longest: int) -> Iterator
     for s in segments:
         if last is None or light is None or s.length != last.length or not _same_light(s, last):
             ends = fast.compilable(s.radiance0), fast.compilable(s.radiance1)
-            light = Ramp(*loop.ramp(*ends, law.gain, law.dark, s.length))
+            light = Ramp(*ramp(*ends, law.gain, law.dark, s.length))
             light = replace(light, own_rise=rise_of(s, law.gain), pieces=pieces_of(s, law.gain))
         last = s
         most = _most(light, longest)

@@ -2,8 +2,8 @@
 
 Poisson arrivals of rate lambda(t) are a unit-rate process in Lambda(t) = integral of lambda.  A pixel that needs N
 electrons therefore fires when Lambda has advanced by Gamma(N, 1), with the reset's draw mixed in (`quantile`).
-Between spikes nothing is drawn: the crossing time follows from the light ramp (`loop`).  Without noise the bits are
-the reference's.
+Between spikes nothing is drawn: the crossing time follows from the light ramp (`spike_to_spike`).  Without noise the
+bits are the reference's.
 
 The number of threads (`threads`) changes no bit.
 """
@@ -12,7 +12,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, fields
-from functools import cached_property, partial
+from functools import cached_property
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -20,7 +20,13 @@ from numpy.typing import NDArray
 
 from spikecam_env.compiled import njit
 from spikecam_env.sensor.effects import Effect
-from spikecam_env.sensor.engines.compiled import every_frame, loop
+from spikecam_env.sensor.engines.compiled import tile_driver
+from spikecam_env.sensor.engines.compiled.every_frame import AT_ONCE
+from spikecam_env.sensor.engines.compiled.queue import run_in_threads
+from spikecam_env.sensor.engines.compiled.tile import COUNT as PIECE_COUNT
+from spikecam_env.sensor.engines.compiled.tile import FIRST as PIECE_FIRST
+from spikecam_env.sensor.engines.compiled.tile import LENGTH as PIECE_LENGTH
+from spikecam_env.sensor.engines.compiled.tile import LIGHT0, LIGHT1, PIECE_COLUMNS, TILE
 from spikecam_env.sensor.ground.intrinsics import address_of
 from spikecam_env.sensor.ground.quantile import MIN_ELECTRONS, fitted_polynomial
 from spikecam_env.sensor.imaging import Imaging
@@ -39,7 +45,6 @@ from spikecam_env.sensor.light import (
 )
 from spikecam_env.sensor.model import generator
 from spikecam_env.sensor.unit import Unit
-from spikecam_env.threads import as_many_as_pay, together
 from spikecam_env.types import Floats, Pictures, Spikes
 
 DENSE = 0.7
@@ -115,7 +120,7 @@ class FastState:
 
 
 class Addresses(NamedTuple):
-    """A camera in the table of `loop.advance`."""
+    """A camera in the table of `tile_driver.advance`."""
 
     arrays: tuple[int, ...]
     """In its order."""
@@ -173,7 +178,7 @@ class Stretch(NamedTuple):
 
     state: FastState
     pieces: NDArray[np.int64]
-    """(S, PIECE_COLUMNS), addresses of light and frames of key intervals, see `loop.advance`."""
+    """(S, PIECE_COLUMNS), addresses of light and frames of key intervals, see `tile_driver.advance`."""
     light: Sequence[Pictures]
     """The arrays at those addresses."""
     out: Spikes
@@ -185,7 +190,7 @@ class Stretch(NamedTuple):
     def changes_often(self) -> bool:
         """Whether its light changes often, so that `every_frame` is faster."""
         frames = len(self.out)
-        return frames >= every_frame.AT_ONCE and frames < OFTEN * len(self.pieces)
+        return frames >= AT_ONCE and frames < OFTEN * len(self.pieces)
 
     @classmethod
     def of(cls, state: FastState, segments: Sequence[Segment], out: Spikes) -> Stretch:
@@ -213,37 +218,24 @@ def run_together(stretches: Sequence[Stretch], *, threads: int | None = None) ->
 def _advance(
     stretches: Sequence[Stretch], outs: Sequence[NDArray[np.uint8]], packed: bool, threads: int | None
 ) -> None:
-    """Advance cameras; outs: spikes of each as bits or as bytes (`loop.advance`)."""
-    jobs = list(zip(stretches, outs, strict=True))
-    for often in (False, True):
-        of_kind = [job for job in jobs if job[0].changes_often is often]
-        if of_kind:
-            _share(of_kind, often, packed, threads)
-
-
-def _share(jobs: Sequence[tuple[Stretch, NDArray[np.uint8]]], often: bool, packed: bool, threads: int | None) -> None:
-    """One compiled call a thread: frame by frame where light changes often, else from spike to spike."""
+    """Advance cameras; outs: spikes of each as bits or as bytes (`tile_driver.advance`)."""
     cameras, bands, done = [], [], 0
-    for number, (one, out) in enumerate(jobs):
+    for number, (one, out) in enumerate(zip(stretches, outs, strict=True)):
         pieces = done, done + len(one.pieces)
         table = one.state.addresses
-        cameras.append((*table.arrays, address_of(out), *table.words, one.pixels, len(out), *pieces))
-        bands += [(number, band) for band in range(-(-one.state.remaining.size // loop.WIDTH))]
+        numbers = *table.words, one.pixels, len(out), *pieces, one.changes_often
+        cameras.append((*table.arrays, address_of(out), *numbers))
+        bands += [(number, band) for band in range(-(-one.state.remaining.size // tile_driver.WIDTH))]
         done = pieces[1]
-    steps = sum(one.pixels * len(out) for one, out in jobs)
-    count = as_many_as_pay(threads, len(bands), steps)
-    tickets = np.zeros((count, 8), dtype=np.int64)
-    tickets[:, 0] = len(bands) * np.arange(count) // count
     work = (
-        tickets,
         np.array(cameras, np.int64),
         np.array(bands, np.int32),
-        np.concatenate([one.pieces for one, _ in jobs]) if len(jobs) > 1 else jobs[0][0].pieces,
+        np.concatenate([one.pieces for one in stretches]) if len(stretches) > 1 else stretches[0].pieces,
         np.float32(DENSE),
         packed,
     )
-    advance = every_frame.advance if often else loop.advance
-    together([partial(advance, worker, *work) for worker in range(count)], shared=True)
+    steps = sum(one.pixels * len(out) for one, out in zip(stretches, outs, strict=True))
+    run_in_threads(tile_driver.advance, work, len(bands), steps, threads)
 
 
 def stretches(
@@ -265,7 +257,7 @@ def _key_stretches(
     if len(spikes) <= MAX_SEGMENT:
         yield Stretch(state, pieces, (radiance,), spikes, spikes.shape[1])
         return
-    ends = np.cumsum(pieces[:, loop.COUNT])
+    ends = np.cumsum(pieces[:, PIECE_COUNT])
     first = done = 0
     while first < len(pieces):
         after = int(np.searchsorted(ends, done + MAX_SEGMENT, side="right"))
@@ -276,20 +268,20 @@ def _key_stretches(
 
 @njit(cache=True, nogil=True)
 def _at_keys(rows: NDArray[np.int64], address: int, size: int) -> NDArray[np.int64]:
-    """Rows of `cuts` as pieces of `loop.advance`; none where a row needs a picture that is no key's.
+    """Rows of `cuts` as pieces of `tile_driver.advance`; none where a row needs a picture that is no key's.
 
     Args:
         address: of the first key's picture.
         size: bytes from one picture to the next.
     """
-    pieces = np.empty((len(rows), loop.PIECE_COLUMNS), np.int64)
+    pieces = np.empty((len(rows), PIECE_COLUMNS), np.int64)
     for k in range(len(rows)):
         if rows[k, KEY0] < 0 or rows[k, KEY1] < 0:
             return pieces[:0]
-        pieces[k, loop.LIGHT0] = address + rows[k, KEY0] * size
-        pieces[k, loop.LIGHT1] = address + rows[k, KEY1] * size
-        pieces[k, loop.LENGTH], pieces[k, loop.FIRST] = rows[k, LENGTH], rows[k, FIRST]
-        pieces[k, loop.COUNT] = rows[k, COUNT]
+        pieces[k, LIGHT0] = address + rows[k, KEY0] * size
+        pieces[k, LIGHT1] = address + rows[k, KEY1] * size
+        pieces[k, PIECE_LENGTH], pieces[k, PIECE_FIRST] = rows[k, LENGTH], rows[k, FIRST]
+        pieces[k, PIECE_COUNT] = rows[k, COUNT]
     return pieces
 
 
@@ -312,7 +304,7 @@ def unpack(packed: NDArray[np.uint8], pixels: int, out: Spikes | None = None) ->
         out = np.empty((len(packed), pixels), dtype=np.uint8)
     padded = 8 * packed.shape[1]
     spikes = out if pixels == padded else np.empty((len(packed), padded), dtype=np.uint8)
-    loop.unpack(packed.reshape(-1), spikes.reshape(-1).view(np.uint64))
+    tile_driver.unpack(packed.reshape(-1), spikes.reshape(-1).view(np.uint64))
     if spikes is not out:
         out[:] = spikes[:, :pixels]
     return out
@@ -326,7 +318,7 @@ def _shape_of_law(unit: Unit) -> tuple[np.float32, ...]:
 
 
 def _padded(values: NDArray[Any], fill: int = 0) -> NDArray[Any]:
-    padded = np.full(values.size + -values.size % loop.TILE, fill, values.dtype)
+    padded = np.full(values.size + -values.size % TILE, fill, values.dtype)
     padded[: values.size] = values
     return padded
 
