@@ -16,7 +16,8 @@ from benchmarks.agreement import compare, observe
 from spikecam_env.errors import InputError
 from spikecam_env.sensor import CATALOGUE, Effect, SensorModel, SpikeSensor, Stage, Unit
 from spikecam_env.sensor.effects.base import Charge, ExposureBlock, parameter
-from spikecam_env.sensor.engines.compiled import block, block_loop
+from spikecam_env.sensor.engines.compiled import block
+from spikecam_env.sensor.engines.compiled.bands.events import SPARSE
 from spikecam_env.sensor.ground.random_fields import white_field, words
 from spikecam_env.sensor.light import Segment
 from spikecam_env.sensor.model import generator
@@ -131,7 +132,7 @@ def test_from_spike_to_spike_has_the_bits_of_frame_by_frame(preset: str, name: s
     rng = np.random.default_rng(0)
     light = (0.6 * rng.random(shape) ** 3).astype(np.float32)
     light.flat[rng.integers(0, light.size, 20)] = [0.0, 3.3] * 10
-    assert light.mean() < block_loop.SPARSE
+    assert light.mean() < SPARSE
     spikes = [
         np.concatenate([*(sensor.step(light, n) for n in calls), sensor.step(0 * light, 9)])
         for calls in ([300], [3] * 100, [1] * 300, [250, 50])

@@ -13,7 +13,7 @@ import pytest
 
 from spikecam_env.errors import InputError
 from spikecam_env.sensor import CATALOGUE, Circuit, Keyframes, SensorModel, SpikeSensor
-from spikecam_env.sensor.engines.compiled import block, queue
+from spikecam_env.sensor.engines.compiled import queue
 from spikecam_env.threads import together
 
 ENGINES = ("reference", "fast")
@@ -141,8 +141,7 @@ def test_a_camera_takes_as_many_threads_as_it_is_given(effects: tuple[str, ...],
     model, taken = SensorModel.preset("scsim"), []
     for name in effects:
         model = model.with_effect(CATALOGUE[name]())
-    for module in (queue, block):
-        monkeypatch.setattr(module, "together", lambda parts, **k: (taken.append(len(parts)), together(parts, **k)))
+    monkeypatch.setattr(queue, "together", lambda parts, **k: (taken.append(len(parts)), together(parts, **k)))
     light = np.full((200, 200), 0.3, np.float32)
     one, three = (SpikeSensor(model, light.shape, 1, threads=n).step(light, 128) for n in (1, 3))
     assert set(taken) == {1, 3}

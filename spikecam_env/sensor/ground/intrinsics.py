@@ -90,6 +90,31 @@ def two_at(typing_context: Any, address: Any) -> Any:
     return types.uint64(types.int64), read
 
 
+@instruction
+def borrowed(typing_context: Any, values: Any) -> Any:
+    """The same array, or tuple of arrays, without an owner.
+
+    Compiled code counts the uses of an array that has one, by two locked instructions whenever it comes out of a tuple.
+    Whoever calls this keeps the owner until after the last use.
+    """
+
+    def without_owner(context: Any, builder: Any, kind: Any, value: Any) -> Any:
+        if isinstance(kind, types.BaseTuple):
+            parts = zip(kind.types, cgutils.unpack_tuple(builder, value), strict=True)  # type: ignore[attr-defined]
+            return context.make_tuple(builder, kind, [without_owner(context, builder, *part) for part in parts])
+        if isinstance(kind, types.Array):
+            array = make_array(kind)(context, builder, value)
+            array.meminfo = cgutils.get_null_value(array.meminfo.type)
+            array.parent = cgutils.get_null_value(array.parent.type)
+            return array._getvalue()
+        return value
+
+    def build(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        return without_owner(context, builder, signature.args[0], arguments[0])
+
+    return values(values), build
+
+
 def address_of(array: NDArray[Any]) -> int:
     """Where an array begins in memory."""
     return int(array.__array_interface__["data"][0])

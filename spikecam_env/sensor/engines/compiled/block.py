@@ -1,7 +1,7 @@
 """The block kernel of the fast engine: every effect, a block of frames at a time.
 
 The effects' hooks give once a block the charge that arrives and the motion of references (`drive`).  A compiled loop
-(`block_loop`) then goes from frame to frame and applies the numbers of `Feedback` to spikes.
+(`bands`) then goes from frame to frame and applies the numbers of `Feedback` to spikes.
 
 Noise is the jump kernel's: a pixel fires when its expected charge has advanced by Gamma(N, 1) / N, with the reset's
 draw mixed in.  N counts the level of the reference at the reset, and not the light that falls while the node is held.
@@ -13,8 +13,6 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
-from functools import partial
-from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -22,12 +20,20 @@ from numpy.typing import NDArray
 
 from spikecam_env.sensor import drive
 from spikecam_env.sensor.effects.base import Charge, Effect, ExposureBlock, Feedback, Few, having
-from spikecam_env.sensor.engines.compiled import block_loop, fast
-from spikecam_env.sensor.engines.compiled.tile import ramp
+from spikecam_env.sensor.engines.compiled import fast
+from spikecam_env.sensor.engines.compiled.bands.arguments import (
+    BlockFrames,
+    BlockLight,
+    BlockPixels,
+    BlockReferences,
+    SpikeLaw,
+)
+from spikecam_env.sensor.engines.compiled.bands.frames import advance, pieces_of_work
+from spikecam_env.sensor.engines.compiled.queue import run_in_threads
+from spikecam_env.sensor.engines.compiled.tile import ramp, ramp_charge
 from spikecam_env.sensor.ground.quantile import MIN_ELECTRONS
-from spikecam_env.sensor.light import GRAINS, Piece, Ramp, Segment, pieces_of, rise_of
+from spikecam_env.sensor.light import GRAINS, Piece, Ramp, Segment, on_grid, pieces_of, rise_of
 from spikecam_env.sensor.unit import Unit
-from spikecam_env.threads import as_many_as_pay, together
 from spikecam_env.types import Floats, Pictures, Spikes
 
 _BLOCK = 1 << 22
@@ -220,36 +226,28 @@ def _block(
     feedback = _sum([e.feedback(now) for e in effects])
     light = light if light.few is None else Charge(light.values)
     few = dark.few or _NO_FEW
-    work: tuple[Any, ...] = (
-        now.number,
-        now.shape[1],
-        _pixels(light),
-        _pixels(dark),
-        few.pixels,
-        _plain(few.charge),
-        _rows(light.factor, now),
-        _rows(dark.factor, now),
-        _plain(law.factor),
-        _plain(law.common),
-        law.field,
-        law.grains_per_mV,
-        *(_plain(nodes) for nodes in (sway.at, sway.factor, sway.common)),
-        tuple(float(number) for number in feedback),
-        state.law.per_electron,
-        state.law.kappa_squared,
-        state.law.polynomial,
-        *state.seeds,
-        state.charge,
-        state.threshold,
-        state.fired,
-        state.activity,
-        state.crossing,
-        spikes,
+    work = (
+        BlockLight(
+            _pixels(light),
+            _pixels(dark),
+            _rows(light.factor, now),
+            _rows(dark.factor, now),
+            few.pixels,
+            _plain(few.charge),
+        ),
+        BlockReferences(
+            _plain(law.factor),
+            _plain(law.common),
+            law.field,
+            law.grains_per_mV,
+            *(_plain(nodes) for nodes in (sway.at, sway.factor, sway.common)),
+        ),
+        SpikeLaw(feedback, state.law.per_electron, state.law.kappa_squared, state.law.polynomial, *state.seeds),
+        BlockPixels(state.charge, state.threshold, state.fired, state.activity, state.crossing),
+        BlockFrames(now.number, now.shape[1], spikes),
     )
-    rows = 1 if feedback.kick or feedback.kick_at_once else now.shape[0]
-    parts = as_many_as_pay(threads, rows, spikes.size)
-    cuts = [now.shape[0] * part // parts for part in range(parts + 1)]
-    together([partial(block_loop.advance, top, bottom, *work) for top, bottom in pairwise(cuts)])
+    pieces = pieces_of_work(*now.shape, feedback)
+    run_in_threads(advance, work, pieces, spikes.size, threads)
     if having("read_out", effects):
         fired = spikes.view(np.bool_).reshape(-1, *now.shape)
         spikes[:] = drive.read_out(now, effects, state.memory, fired).reshape(spikes.shape)
@@ -263,7 +261,7 @@ def _mean(parts: Sequence[_Part]) -> Floats:
     mean = np.empty((sum(p.count for p in parts), light.level.size))
     done = 0
     for p in parts:
-        block_loop.ramp_charge(p.light.level, p.light.curve, p.light.rest, p.first, mean[done : done + p.count])
+        ramp_charge(p.light.level, p.light.curve, p.light.rest, p.first, mean[done : done + p.count])
         done += p.count
     return mean
 
@@ -289,17 +287,15 @@ def _plain(values: Floats) -> Floats:
 
 
 def _sum(feedbacks: Sequence[Feedback]) -> Feedback:
-    """One law of several: losses, kicks and droops add, shares kept multiply."""
-    total = Feedback()
+    """One law of several, as the loop takes it: losses, kicks and droops add, shares kept multiply; floats all.
+
+    Its kick at once is in grains, on their grid.
+    """
+    root = rate = kick = left = droop = at_once = 0.0
+    kept = left_tau = 1.0
     for one in feedbacks:
-        total = Feedback(
-            total.lost_per_root_rate + one.lost_per_root_rate,
-            total.lost_per_rate + one.lost_per_rate,
-            total.kept * one.kept,
-            total.kick + one.kick,
-            total.left + one.left,
-            one.left_tau if one.left else total.left_tau,
-            total.droop + one.droop,
-            total.kick_at_once + one.kick_at_once,
-        )
-    return total
+        root, rate, kept = root + one.lost_per_root_rate, rate + one.lost_per_rate, kept * one.kept
+        kick, droop, at_once = kick + one.kick, droop + one.droop, at_once + one.kick_at_once
+        left, left_tau = left + one.left, one.left_tau if one.left else left_tau
+    at_once = on_grid(at_once * GRAINS) if at_once else 0.0
+    return Feedback(*map(float, (root, rate, kept, kick, left, left_tau, droop, at_once)))

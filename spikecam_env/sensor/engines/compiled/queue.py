@@ -51,5 +51,6 @@ def run_in_threads(
     """
     workers = as_many_as_pay(threads, pieces, pixel_steps)
     tickets = np.zeros((workers, 8), dtype=np.int64)
-    tickets[:, 0] = pieces * np.arange(workers) // workers
+    for worker in range(1, workers):
+        tickets[worker, 0] = pieces * worker // workers
     together([partial(advance, worker, tickets, *work) for worker in range(workers)], shared=True)

@@ -25,7 +25,7 @@ from spikecam_env.compiled import njit
 from spikecam_env.sensor.ground.draws import GOLDEN, bell_of, first_key, scramble, second_key
 from spikecam_env.sensor.ground.intrinsics import pointer_to
 from spikecam_env.sensor.light import GRAINS, MAX_GRAINS_PER_FRAME, MAX_SEGMENT
-from spikecam_env.types import Pictures
+from spikecam_env.types import Floats, Pictures
 
 TILE = 256
 """Pixels worked on between reading and writing memory; state arrays are padded to whole tiles."""
@@ -145,6 +145,24 @@ def ramp(light0: Any, light1: Any, gain: Any, dark: Any, length: Any) -> Any:
     for p in range(light0.size):
         level[p], curve[p], rest[p] = ramp_of(light0[p], light1[p], gain[p], dark[p], twice, per_twice, per)
     return level, curve, rest
+
+
+@njit(cache=True, nogil=True, error_model="numpy", boundscheck=False)
+def ramp_charge(
+    level: NDArray[np.int32], curve: NDArray[np.int32], rest: NDArray[np.int32], first: int, out: Floats
+) -> None:
+    """Charge of frames first .. of a key interval: out (F, P) float64 [thresholds], overwritten; see `light.Ramp`."""
+    frames, pixels = out.shape
+    for t in range(frames):
+        k0 = np.int32(first + t)
+        k1 = np.int32(k0 + 1)
+        s0, s1 = np.int32(k0 * k0), np.int32(k1 * k1)
+        row = out[t]
+        for p in range(pixels):
+            bend = np.int32(
+                np.int32(np.int32(rest[p] * s1) >> np.int32(18)) - np.int32(np.int32(rest[p] * s0) >> np.int32(18))
+            )
+            row[p] = np.int32(np.int32(level[p] + np.int32(curve[p] * np.int32(s1 - s0))) + bend) * (1.0 / GRAINS)
 
 
 @njit(inline="always")

@@ -23,7 +23,7 @@ from spikecam_env.sensor.engines.compiled.tile import (
     TileScratch,
     X,
 )
-from spikecam_env.sensor.ground.intrinsics import pointer_to, use_widest_vectors
+from spikecam_env.sensor.ground.intrinsics import borrowed, pointer_to, use_widest_vectors
 
 BAND = 8
 """Tiles that one thread takes at a time; 2 kilobytes of a frame are then written in one go."""
@@ -74,7 +74,7 @@ def advance(
     use_widest_vectors()
     room = np.empty(ROOM, np.int64)
     work = scratch_in(room)
-    pieces = carray(pointer_to(pieces.ctypes.data, np.int64), pieces.shape)
+    pieces = borrowed(pieces)
     planes = np.empty(8 * WIDTH, np.uint8)
     ticket, share = next_piece(tickets, worker, worker, len(bands))
     while ticket >= 0:
