@@ -168,8 +168,9 @@ class SlewingClock(Clock):
 
 
 def means(waves: Sequence[Wave], t: Array) -> Array:
-    """Product of the waves' means between successive times of the last axis; exact for one wave."""
+    """Product of the waves' means between successive times of the last axis (0 between equal ones); exact for one."""
+    span = np.diff(t, axis=-1)
     product = np.ones((*t.shape[:-1], t.shape[-1] - 1))
     for wave in waves:
-        product *= np.diff(wave.area(t), axis=-1) / np.diff(t, axis=-1)
+        product *= np.diff(wave.area(t), axis=-1) / np.where(span > 0.0, span, 1.0)
     return product

@@ -12,8 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from benchmarks.literal.camera import Camera
-from benchmarks.literal.statistics import (
+from benchmarks.within_frame.statistics import (
     A1,
     A4,
     COINCIDENCE,
@@ -37,9 +36,11 @@ from benchmarks.literal.statistics import (
     wander,
     windows,
 )
+from benchmarks.within_frame.world import filmed
 from spikecam_env.sensor import Keyframes, SensorModel, SpikeSensor
 from spikecam_env.sensor.effects import CATALOGUE
 from spikecam_env.types import Floats, Spikes
+from tests.hidden_world.light import Light
 
 JUMP = 1e-6
 """Time that a jump of light takes [frames]."""
@@ -87,20 +88,14 @@ class Case:
         rows, columns = self.shape
         return (self.groups, self.shape) if self.separate else (1, (rows, columns * self.groups))
 
-    def literal(self, seed: int) -> list[Spikes]:
-        """Spikes (F, H, W) of every group, electron by electron."""
+    def world(self, seed: int) -> list[Spikes]:
+        """Spikes (F, H, W) of every group in the hidden world."""
         cameras, shape = self.cameras
         keys, levels = self.film(self.frames)
+        light = Light(keys, levels[:, None, None].astype(np.float32))
+        seeds = np.random.SeedSequence([seed, 1]).generate_state(cameras)
         picture = self._picture(shape)
-        streams = np.random.SeedSequence([seed, 1]).spawn(cameras)
-        return self._grouped(
-            [
-                Camera(
-                    self.model, self.frames, shape, keys, levels, picture, np.random.Generator(np.random.PCG64(s))
-                ).exposed()
-                for s in streams
-            ]
-        )
+        return self._grouped([filmed(self.effects, self.electrons, picture, light, self.frames, int(s)) for s in seeds])
 
     def check(self) -> None:
         """Raise InputError where the sensor refuses this setting."""
@@ -480,7 +475,7 @@ def _readout() -> list[Case]:
         Case(".25 us, edges at n + .6", edges, jitter(250.0), (RATE, *after(5, 20)), **common),
         Case("p .05, 2 frames", steady(0.22), {"afterpulsing": {"probability": 0.05, "delay_frames": 2}}, STEADY),
         Case("p .3, 1 frame", steady(0.7), {"afterpulsing": {"probability": 0.3, "delay_frames": 1}}, STEADY),
-        Case("5 %", steady(0.3), {"dead_pixels": {"fraction": 0.05}}, (RATE, SPREAD), separate=True, frames=100),
+        Case("5 %", steady(0.3), {"dead_pixels": {"fraction": 0.05}}, (RATE, SPREAD), frames=100),
         Case("p .05", steady(0.3), {"missed_spikes": {"probability": 0.05}}, STEADY),
         Case("p .01", steady(0.2), {"spurious_spikes": {"probability": 0.01}}, STEADY),
         Case(

@@ -31,9 +31,9 @@ class Statistic:
 
 @dataclass(frozen=True)
 class Comparison:
-    """A statistic of the literal simulation and of an engine."""
+    """A statistic of the hidden world and of an engine."""
 
-    literal: float
+    world: float
     engine: float
     z: float
     error: float
@@ -44,9 +44,9 @@ class Comparison:
         return abs(self.z) <= LIMIT
 
 
-def compared(statistic: Statistic, literal: list[Spikes], engine: list[Spikes]) -> Comparison:
+def compared(statistic: Statistic, world: list[Spikes], engine: list[Spikes]) -> Comparison:
     """Two sets of groups by one statistic."""
-    a, b = (np.array([statistic.of(group) for group in groups], np.float64) for groups in (literal, engine))
+    a, b = (np.array([statistic.of(group) for group in groups], np.float64) for groups in (world, engine))
     if a.ndim > 1:
         return _histograms(a, b)
     mean_a, mean_b = a.mean(), b.mean()
