@@ -425,8 +425,7 @@ class Recording:
             self.glare = np.where(bright, 1.0, self.glare * np.exp(-1.0 / ph.glare_tau))
             light = np.where(bright, light, light * (1.0 - ph.glare_loss * self.glare))
         if ph.response is not None or ph.bloom_share:
-            pieces = zip(light.T, span.T, strict=True)
-            light = np.stack([self._bent(charge / part) * part for charge, part in pieces], axis=1)
+            light = self._bent(light / span) * span
         if self.bends:
             self.within = light
         x = light.sum(axis=1)
@@ -437,15 +436,17 @@ class Recording:
         return np.maximum(x, 0.0)
 
     def _bent(self, x: Array) -> Array:
-        """Charge a frame (P,) of light that would bring x evenly, after the response and blooming."""
-        ph = self.physics
+        """Charge a frame (P, S) of light that would bring x, after the response and blooming."""
+        ph, (rows, columns) = self.physics, self.physics.shape
         if ph.response is not None:
             x = ph.response(x)
         if ph.bloom_share:
             spill = ph.bloom_share * np.maximum(x - ph.bloom_full, 0.0)
             x = x - spill
-            for way in ph.bloom_to if spill.any() else ():
-                give(x.reshape(ph.shape), spill.reshape(ph.shape), 1.0 / len(ph.bloom_to), *way, False)
+            beyond = np.pad(spill.reshape(rows, columns, -1), ((1, 1), (1, 1), (0, 0)))
+            for down, right in ph.bloom_to if spill.any() else ():
+                given = beyond[1 - down : rows + 1 - down, 1 - right : columns + 1 - right]
+                x += 1.0 / len(ph.bloom_to) * given.reshape(x.shape)
         return x
 
     def _dark_of(self, n: int, of: tuple[Window, Array, Array, float]) -> Array:

@@ -11,7 +11,7 @@ from tests.hidden_world.bench import filmed, hidden, intervals, near, plain_came
 from tests.hidden_world.light import Light
 from tests.hidden_world.pixels import slow_noise
 from tests.hidden_world.unit import SWING_V
-from tests.hidden_world.waves import Clock, Flashes, Polygon, Pulses, Rise, Sine, SlewingClock, Square, Wave
+from tests.hidden_world.waves import Clock, Flashes, Polygon, Rise, Sine, SlewingClock, Switched, Wave
 
 QUIET = plain_camera((32, 32), electrons=0.0, spread=0.0)
 LOOSE = plain_camera((32, 32), electrons=2e3, kappa=0.05, spread=0.1)
@@ -22,10 +22,9 @@ LOOSE = plain_camera((32, 32), electrons=2e3, kappa=0.05, spread=0.1)
     "wave",
     [
         Sine(0.3, 0.425, 0.2),
-        Pulses(7.3, 2.1, 4.0),
+        Switched(7.3, 2.1, 4.0, 0.0, 1.0),
         Rise(0.5, 30.0),
         Rise(0.5, 30.0, begin=-20.0),
-        Square(0.3, 0.041, 0.2),
         Flashes(np.array([2.2, 9.7]), 0.4, 3.0),
         Polygon(np.array([0.0, 3.5, 3.6, 11.0]), np.array([0.1, 0.1, 0.5, 0.2])),
     ],

@@ -13,7 +13,7 @@ from tests.hidden_world.integrator import Physics
 from tests.hidden_world.light import Light
 from tests.hidden_world.mechanism import Law, Mechanism, OnCamera, Parameters, Rng
 from tests.hidden_world.unit import FRAME_S, Camera
-from tests.hidden_world.waves import Polygon, Sine, Square
+from tests.hidden_world.waves import Polygon, Sine, Switched
 
 HOPS_PER_S = 40.0
 """Jumps of an arc lamp: eight in a recording of 8000 frames."""
@@ -47,7 +47,8 @@ def _sine(ph: Physics, camera: Camera, frames: int, p: Parameters, rng: Rng) -> 
 
 
 def _switched(ph: Physics, camera: Camera, frames: int, p: Parameters, rng: Rng) -> None:
-    ph.light_waves += (Square(p["modulation"], p["frequency_hz"] * FRAME_S, rng.random()),)
+    period, m = 1.0 / (p["frequency_hz"] * FRAME_S), p["modulation"]
+    ph.light_waves += (Switched(period, 0.5 * period, period * rng.random(), 1.0 + m, 1.0 - m),)
 
 
 def _two_lamps(ph: Physics, camera: Camera, frames: int, p: Parameters, rng: Rng) -> None:
