@@ -83,6 +83,8 @@ class WithinFrame:
     """Independent groups of pixels a setting; default by setting."""
     frames: int | None = None
     """Frames a setting, 64 or more; default by setting."""
+    electrons: float | None = None
+    """Electrons to a threshold: the hidden world counts them one by one up to 1000; default by setting."""
     out: Path | None = None
     """File for every comparison, a table of Markdown."""
     page: Path | None = None
@@ -91,7 +93,7 @@ class WithinFrame:
     def run(self) -> None:
         for path in filter(None, (self.out, self.page)):
             check_file(path)
-        chosen = list(chosen_cases(self.only, self.quick, self.groups, self.frames))
+        chosen = list(chosen_cases(self.only, self.quick, self.groups, self.frames, self.electrons))
         if self.page:
             _written(self.page, "")
         rows: list[Row] = []
@@ -112,7 +114,11 @@ class WithinFrame:
 
 
 def chosen_cases(
-    only: Iterable[str] = (), quick: bool = False, groups: int | None = None, frames: int | None = None
+    only: Iterable[str] = (),
+    quick: bool = False,
+    groups: int | None = None,
+    frames: int | None = None,
+    electrons: float | None = None,
 ) -> Iterable[Case]:
     """The settings asked for.  Raises InputError for an effect that has none, and for too few groups or frames."""
     named = {case.effect for case in cases()}
@@ -123,9 +129,13 @@ def chosen_cases(
         raise InputError(f"--groups {groups}: a standard error needs 8 groups or more")
     if frames is not None and frames < 64:
         raise InputError(f"--frames {frames}: it must be 64 or more")
+    if electrons is not None and not 1.0 <= electrons <= 1e6:
+        raise InputError(f"--electrons {electrons:g}: it must be from 1 to 1 000 000")
+    given = {"groups": groups, "frames": frames, "electrons": electrons}
+    changed: dict[str, Any] = {name: value for name, value in given.items() if value is not None}
     for case in cases():
         if (case.quick or not quick) and (not only or case.effect in only):
-            yield replace(case, groups=groups or case.groups, frames=frames or case.frames)
+            yield replace(case, **changed)
 
 
 def refused(case: Case) -> Refusal | None:

@@ -66,10 +66,16 @@ def test_rows_are_written_between_the_markers(tmp_path, capsys) -> None:  # type
     assert out.read_text(encoding="utf-8").count("| missed_spikes |") == 12
 
 
-@pytest.mark.parametrize("options", [["--only", "glare"], ["--groups", "3"], ["--frames", "10"], ["--page", "."]])
-def test_what_is_no_setting_is_refused_in_a_line(options: list[str], capsys) -> None:  # type: ignore[no-untyped-def]
-    assert main(options) == 2
-    assert capsys.readouterr().err.startswith(f"spikecam: {options[0]}")
+@pytest.mark.parametrize("option", ["--only glare", "--groups 3", "--frames 10", "--electrons 0"])
+def test_what_is_no_setting_is_refused_in_a_line(option: str, capsys) -> None:  # type: ignore[no-untyped-def]
+    assert main(option.split()) == 2
+    assert capsys.readouterr().err.startswith(f"spikecam: {option}: ")
+
+
+def test_a_page_without_markers_is_refused_before_anything_is_compared(tmp_path, capsys) -> None:  # type: ignore[no-untyped-def]
+    (tmp_path / "page.md").write_text("text\n", encoding="utf-8")
+    assert main(["--page", str(tmp_path / "page.md")]) == 2
+    assert "once, in this order" in capsys.readouterr().err
 
 
 def test_what_is_no_setting_raises() -> None:
