@@ -8,18 +8,18 @@ slow noise has an octave a process; the lens' spread is a normal law sampled at 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from typing import Any
 
 import numpy as np
 
 from spikecam_env.sensor.effects import CATALOGUE
 from spikecam_env.types import Floats, Spikes
+from tests.hidden_world.bench import plain_camera
 from tests.hidden_world.catalogue.optics import normal_law
 from tests.hidden_world.integrator import Physics
 from tests.hidden_world.light import Light, Shot
 from tests.hidden_world.mechanism import Hidden, Parameters
-from tests.hidden_world.unit import CAPACITANCE_FF, SWING_V, Camera
 from tests.hidden_world.world import MECHANISMS, Recipe, film
 
 PIECES = 80
@@ -47,6 +47,7 @@ def filmed(
         picture = normal_law(picture, blur["sigma_pixels"])
     shape = (picture.shape[0], picture.shape[1])
     hidden = [_hidden(name, p, shape, seed) for name, p in parameters.items()]
+    camera = replace(plain_camera(shape, electrons, spread=0.0), gain=picture)
     recipe = Recipe(seed, "ideal", tuple(hidden), shape=shape, frames=frames)
 
     def as_in_the_sensor(physics: Physics) -> None:
@@ -58,21 +59,7 @@ def filmed(
             physics.slow_tau = 2.0 ** np.arange(1.0, flicker["octaves"] + 1.0)
             physics.slow_mv = np.full(physics.slow_tau.size, flicker["sigma_mV"])
 
-    return film(recipe, _camera(picture, electrons), Shot("", "", light), as_in_the_sensor)
-
-
-def _camera(gain: Floats, electrons: float) -> Camera:
-    one = np.ones(gain.shape)
-    return Camera(
-        shape=(gain.shape[0], gain.shape[1]),
-        gain=gain,
-        dark=0.0 * one,
-        quiet=one / electrons,
-        kappa=0.0 * one,
-        per_mv=1e-3 / SWING_V * one,
-        phi_fc=CAPACITANCE_FF * SWING_V * one,
-        drawn={},
-    )
+    return film(recipe, camera, Shot("", "", light), as_in_the_sensor)
 
 
 def _hidden(name: str, p: Parameters, shape: tuple[int, int], seed: int) -> Hidden:

@@ -1,4 +1,4 @@
-"""A workbench for the tests of the hidden world: small cameras with every number given."""
+"""A workbench for those who try the hidden world: small cameras with every number given."""
 
 from __future__ import annotations
 
