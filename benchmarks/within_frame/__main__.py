@@ -98,11 +98,12 @@ class WithinFrame:
             _written(self.page, "")
         rows: list[Row] = []
         refusals: list[Refusal] = []
-        for number, case in enumerate(tqdm(chosen, unit="setting")):
+        number = {(case.effect, case.label): n for n, case in enumerate(cases())}  # the same alone and among others
+        for case in tqdm(chosen, unit="setting"):
             if refusal := refused(case):
                 refusals.append(refusal)
                 continue
-            for row in compare(case, self.seed * 1000 + number):
+            for row in compare(case, self.seed * 1000 + number[case.effect, case.label]):
                 rows.append(row)
                 if not row.comparison.agrees:
                     tqdm.write(" | ".join(row.cells.values()))

@@ -413,13 +413,14 @@ class Recording:
             x = x * ph.gain_movie[min(n // ph.gain_every, len(ph.gain_movie) - 1)]
         light, span = x[:, None], np.ones((1, 1))
         if self.bends:
-            u = window.u[self.row_of]
-            light = light * (window.light[self.row_of] + self.tilt[:, None] * np.diff(u * u - u, axis=1))
+            row = self.row_of if window.start.size > 1 else slice(1)
+            u = window.u[row]
+            light = light * (window.light[row] + self.tilt[:, None] * np.diff(u * u - u, axis=1))
             span = np.maximum(np.diff(u, axis=1), 1e-12)
         if ph.lags and self.bends:
             every, light = light, (1.0 - sum(share for share, _ in ph.lags)) * light
             for late, (share, tau) in zip(self.late, ph.lags, strict=True):
-                lagged(every, span, late, share, tau, ph.lag_fills_at_once, light)
+                lagged(every, span, np.exp(-span / tau), late, share, tau, ph.lag_fills_at_once, light)
         if ph.glare_loss:
             bright = light.sum(axis=1, keepdims=True) > 1.0
             self.glare = np.where(bright, 1.0, self.glare * np.exp(-1.0 / ph.glare_tau))
@@ -442,9 +443,11 @@ class Recording:
             x = ph.response(x)
         if ph.bloom_share:
             spill = ph.bloom_share * np.maximum(x - ph.bloom_full, 0.0)
+            if not spill.any():
+                return x
             x = x - spill
             beyond = np.pad(spill.reshape(rows, columns, -1), ((1, 1), (1, 1), (0, 0)))
-            for down, right in ph.bloom_to if spill.any() else ():
+            for down, right in ph.bloom_to:
                 given = beyond[1 - down : rows + 1 - down, 1 - right : columns + 1 - right]
                 x += 1.0 / len(ph.bloom_to) * given.reshape(x.shape)
         return x

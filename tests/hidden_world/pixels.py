@@ -323,19 +323,20 @@ def _between(keys, t, first):
 
 
 @njit(cache=True, **PLAIN)
-def lagged(light, span, late, share, tau, fills_at_once, total):
+def lagged(light, span, kept, late, share, tau, fills_at_once, total):
     """Add to `total` (P, S) the charge of a late part, share h_tau * light, in each piece; late (P,) is its rate.
 
-    Within a piece light is constant, and the part relaxes towards it: exact; or is there at once, where it is more.
+    kept: of a difference after each piece, exp(-span / tau).  Within a piece light is constant, and the part relaxes
+    towards it: exact; or is there at once, where it is more.
     """
     for p in range(light.shape[0]):
+        r = p if span.shape[0] > 1 else 0
         for s in range(light.shape[1]):
-            rate = light[p, s] / span[p, s]
-            kept = np.exp(-span[p, s] / tau)
+            rate = light[p, s] / span[r, s]
             if fills_at_once and rate > late[p]:
                 late[p] = rate
-            total[p, s] += share * (light[p, s] + (late[p] - rate) * tau * (1.0 - kept))
-            late[p] = rate + (late[p] - rate) * kept
+            total[p, s] += share * (light[p, s] + (late[p] - rate) * tau * (1.0 - kept[r, s]))
+            late[p] = rate + (late[p] - rate) * kept[r, s]
 
 
 @njit(cache=True, **PLAIN)
