@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import pytest
 
-from benchmarks.within_frame.__main__ import chosen_cases, compare, main
-from benchmarks.within_frame.cases import Case, cases, steady, strobe
-from benchmarks.within_frame.statistics import RATE, SERIAL, compared
+from benchmarks.settings.cases import Case, cases, steady, strobe
+from benchmarks.settings.statistics import RATE, SERIAL, compared
+from benchmarks.within_frame import chosen_cases, compare, main
 from spikecam_env.errors import InputError
 from spikecam_env.sensor.effects import CATALOGUE
 
@@ -48,7 +48,7 @@ def test_what_the_sensor_refuses_is_listed_and_not_compared(monkeypatch, capsys,
         Case("weak", steady(0.3), {"dead_time": {"tau_us": 0.1}}, (RATE,), groups=8, frames=64),
         Case("strobe", strobe(0.4, 0.2, 0.3), {"dead_time": {"tau_us": 12.5}}, (RATE,), groups=8, frames=64),
     ]
-    monkeypatch.setattr("benchmarks.within_frame.__main__.cases", lambda: cases_of_two)
+    monkeypatch.setattr("benchmarks.within_frame.cases", lambda: cases_of_two)
     assert main(["--page", str(page)]) == 0
     assert "1 settings are refused" in capsys.readouterr().out
     written = page.read_text(encoding="utf-8")

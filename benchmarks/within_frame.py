@@ -19,8 +19,8 @@ import tyro
 from scipy import stats
 from tqdm import tqdm
 
-from benchmarks.within_frame.cases import Case, cases
-from benchmarks.within_frame.statistics import LIMIT, Comparison, compared
+from benchmarks.settings.cases import Case, cases
+from benchmarks.settings.statistics import LIMIT, Comparison, compared
 from spikecam_env.cli.main import run_parsed
 from spikecam_env.cli.table import markdown
 from spikecam_env.errors import InputError

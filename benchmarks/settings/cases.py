@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from benchmarks.within_frame.statistics import (
+from benchmarks.settings.statistics import (
     A1,
     A4,
     COINCIDENCE,
@@ -36,7 +36,7 @@ from benchmarks.within_frame.statistics import (
     wander,
     windows,
 )
-from benchmarks.within_frame.world import filmed
+from benchmarks.settings.world import filmed
 from spikecam_env.sensor import Keyframes, SensorModel, SpikeSensor
 from spikecam_env.sensor.effects import CATALOGUE
 from spikecam_env.types import Floats, Spikes
