@@ -95,14 +95,7 @@ class BlindTrial:
         print(f"wrote {self.out / 'trial.json'} and {self.out / 'trial.md'}")
 
 
-def diagnosed(
-    campaign: Path,
-    model: str,
-    out: Path,
-    seed: int,
-    exclude: Sequence[str],
-    threads: int,
-) -> dict[str, Any]:
+def diagnosed(campaign: Path, model: str, out: Path, seed: int, exclude: Sequence[str], threads: int) -> dict[str, Any]:
     """`spikecam diagnose` as a trial wants it, its report included."""
     try:
         from spikecam_env.gap.diagnose import diagnose

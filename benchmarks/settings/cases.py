@@ -226,10 +226,7 @@ def _photodiode() -> list[Case]:
         return {"random_telegraph_noise": telegraph, "dark_current": {"mean_pA": 19.0}}
 
     def warming(rise: float, frames: float) -> dict[str, dict[str, Any]]:
-        return {
-            "dark_current_drift": {"rise": rise, "tau_ms": 0.025 * frames},
-            "dark_current": {"mean_pA": 38.0},
-        }
+        return {"dark_current_drift": {"rise": rise, "tau_ms": 0.025 * frames}, "dark_current": {"mean_pA": 38.0}}
 
     def bent(beta: float) -> dict[str, dict[str, Any]]:
         return {"photo_response_nonlinearity": {"beta": beta}}

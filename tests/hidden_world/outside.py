@@ -205,11 +205,7 @@ def _repeated_frames(bits: Bits, p: Parameters, rng: Rng) -> Bits:
 TUNE = {
     m.name: m
     for m in (
-        Mechanism(
-            "ping_pong_threshold",
-            "every second threshold of a pixel is higher",
-            physics=_ping_pong,
-        ),
+        Mechanism("ping_pong_threshold", "every second threshold of a pixel is higher", physics=_ping_pong),
         Mechanism(
             "two_component_lag",
             "a fast and a slow part of the light come late",
@@ -296,11 +292,7 @@ REPORT = {
             shape(charge=between(0.3, 0.7)),
             physics=_streaks,
         ),
-        Mechanism(
-            "ghost_image",
-            "a faint image turned by 180 degrees",
-            light=_ghost,
-        ),
+        Mechanism("ghost_image", "a faint image turned by 180 degrees", light=_ghost),
         Mechanism(
             "saturation_memory",
             "less sensitive for a while after more than one threshold a frame",
@@ -319,11 +311,7 @@ REPORT = {
             shape(kappa=between(0.06, 0.12)),
             physics=_heavy_tailed_reset,
         ),
-        Mechanism(
-            "row_bus_limit",
-            "a row's bus carries so many spikes a frame, the others wait",
-            bits=_row_bus,
-        ),
+        Mechanism("row_bus_limit", "a row's bus carries so many spikes a frame, the others wait", bits=_row_bus),
         Mechanism(
             "speckle",
             "the light on each pixel fluctuates by itself",
@@ -336,11 +324,7 @@ REPORT = {
             shape(period_pixels=between(6.0, 14.0), angle=between(0.4, 1.1)),
             camera=_fringes,
         ),
-        Mechanism(
-            "repeated_frames",
-            "now and then the frame before is read again",
-            bits=_repeated_frames,
-        ),
+        Mechanism("repeated_frames", "now and then the frame before is read again", bits=_repeated_frames),
         Mechanism(
             "missing_slot",
             "in some columns one frame of sixteen reports nothing, the spike comes a frame later",

@@ -6,13 +6,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from tests.hidden_world.catalogue.drawing import (
-    RESET_SUBSTEPS,
-    Array,
-    frames_of,
-    log_uniform,
-    shape,
-)
+from tests.hidden_world.catalogue.drawing import RESET_SUBSTEPS, Array, frames_of, log_uniform, shape
 from tests.hidden_world.integrator import Physics
 from tests.hidden_world.mechanism import Law, Mechanism, OnPhysics, Parameters, Rng
 from tests.hidden_world.unit import Camera
