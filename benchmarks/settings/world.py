@@ -51,7 +51,9 @@ def filmed(
     recipe = Recipe(seed, "ideal", tuple(hidden), shape=shape, frames=frames)
 
     def as_in_the_sensor(physics: Physics) -> None:
-        physics.substeps, physics.delay_reports = PIECES, False
+        physics.substeps = PIECES
+        if physics.laws.delay:
+            physics.laws = physics.laws._replace(delay_reports=0.0)
         if clock := physics.clock:  # its mean over a frame, taken off all thresholds
             mean = float(clock.height(np.zeros(1))[0]) * clock.tau * (1.0 - np.exp(-1.0 / clock.tau))
             physics.row_mv = np.full((frames, shape[0]), -mean, np.float32)

@@ -46,7 +46,7 @@ Whole = NDArray[np.int64]
 
 BLOCK = 64
 """Frames whose windows are made at once."""
-NO_LAWS = Laws(0.0, 0.0, 0.0, 0.5, 1.0, 0.0, 1.0, 0.0, 0.0, 1.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+NO_LAWS = Laws()
 """A crossing takes the threshold away, and no more."""
 
 
@@ -133,42 +133,18 @@ class Physics:
     """1: by rows, 0: by columns"""
     array_sag: float = 0.0
     sag_tau: float = 1.0
-    alternate: float = 0.0
-    """every second threshold of a pixel is higher by this"""
-    outlier_share: float = 0.0
-    outlier_kappa: float = 0.0
 
     substeps: int = 1
     """pieces that a frame is cut into at least, where light moves or sensitivity does"""
-    dead: float = 0.0
-    dead_by_light: float = 0.0
-    """of dead time, by charge a frame"""
+    laws: Laws = NO_LAWS
+    """of a crossing"""
     dead_share: Array | None = None
     """(P,) factor on the dead time of each pixel"""
-    delay: float = 0.0
-    """c of a delay c / x^delay_power"""
-    delay_power: float = 0.5
-    delay_reports: bool = True
-    """whether a spike is of the frame in which the comparator trips, or else of its crossing"""
-    hold_loss: float = 0.0
-    """share lost of the charge between a crossing and the end of its frame"""
-    hold_chance: float = 1.0
-    """share of the resets that lose it"""
-    left_always: float = 0.0
-    """charge that a reset leaves at least; beside it left_fraction (1 - exp(-T / left_tau))"""
-    left_fraction: float = 0.0
-    left_tau: float = 1.0
-    ramp_loss: float = 0.0
-    """sensitivity lost just after a reset"""
-    ramp_tau: float = 1.0
-    reset_ripple: tuple[float, float, float] = (0.0, 0.0, 0.0)
-    """amplitude, cycles a frame and phase of a sine on the level of a reset, which its cycle keeps"""
-    kick: float = 0.0
-    """charge that a spike gives to the pixels `kick_to` (rows, columns) away"""
+    late_kick: float = 0.0
+    """charge that a spike gives at the end of its frame"""
     kick_to: tuple[tuple[int, int], ...] = ()
+    """(rows, columns) away of the pixels that a spike gives charge to"""
     kick_wraps: bool = False
-    kick_at_spike: bool = True
-    """at once, or else at the end of the frame"""
 
     @property
     def light_is_steady(self) -> bool:
@@ -180,14 +156,11 @@ class Physics:
     def is_steady(self) -> bool:
         """Whether nothing at all changes in time, and a reset only takes the threshold away."""
         waves = (self.dark_movie, self.row_mv, self.column_mv, self.clock)
-        scalars = (
-            self.array_sag, self.alternate, self.outlier_share, self.dead, self.delay, self.hold_loss,
-            self.left_fraction, self.ramp_loss, self.kick, self.reset_ripple[0],
-        )  # fmt: skip
         events = self.dark_steps[0].size + self.hits[0].size + self.slow_mv.size
         events += self.droop.size + self.frame_noise_mv.size
         moving = self.dark_waves or self.threshold_waves or any(a is not None for a in waves)
-        return self.light_is_steady and not moving and not any(scalars) and not events
+        events += bool(self.array_sag) + bool(self.late_kick)
+        return self.light_is_steady and not moving and not events and self.laws == NO_LAWS
 
     @property
     def margin(self) -> float:
@@ -199,18 +172,8 @@ class Physics:
             millivolts += -float(self.clock.height(np.zeros(1))[0])
         wave = sum(abs(w.amplitude) for w in self.threshold_waves)
         common = 1.2 * (wave + float(np.abs(self.droop).max(initial=0.0)) + abs(self.array_sag))
-        kicks = 2.0 * len(self.kick_to) * abs(self.kick) if self.kick_at_spike else 0.0
+        kicks = 2.0 * len(self.kick_to) * abs(self.laws.kick)
         return float(0.005 + 7.0 * np.sqrt(self.quiet.max()) + millivolts * self.per_mv.max() + common + kicks)
-
-    @property
-    def laws(self) -> Laws:
-        """The laws of a crossing."""
-        return Laws(
-            self.dead, self.dead_by_light, self.delay, self.delay_power, float(self.delay_reports or not self.delay),
-            self.hold_loss, self.hold_chance, self.left_always, self.left_fraction, self.left_tau, self.ramp_loss,
-            self.ramp_tau, self.alternate, self.outlier_share, self.outlier_kappa,
-            self.kick if self.kick_at_spike else 0.0, *self.reset_ripple,
-        )  # fmt: skip
 
 
 class Windows:
@@ -231,7 +194,7 @@ class Windows:
         light_moves = bool(self.light) or ph.light_leak is not None
         self.alike = not light_moves and not ph.threshold_waves and ph.edge is None
         within = self.moving_threshold or ph.substeps > 1
-        moving = ph.ramp_loss or ph.slow_mv.size or ph.threshold_waves or not ph.light_is_steady
+        moving = ph.laws.ramp_loss or ph.slow_mv.size or ph.threshold_waves or not ph.light_is_steady
         even = ph.substeps if moving else 1
         self.pieces = max([even, *(_pieces(w.cycles) for w in ph.threshold_waves)])
         self.light_within = light_moves and (within or bool(ph.lags))
@@ -366,9 +329,9 @@ class Recording:
         self, n: int, light: Array, dark: Array, window: Window, margin: float, laws: Laws, bits: NDArray[np.uint8]
     ) -> None:
         ph = self.physics
-        near = self.near[: coast(self.pixels, ph.ramp_tau, margin, light, dark, self.near)]
+        near = self.near[: coast(self.pixels, laws.ramp_tau, margin, light, dark, self.near)]
         come = Come(light, self.within, self.tilt, dark, *self._thresholds(n, near, window))
-        if ph.kick and ph.kick_at_spike:
+        if laws.kick:
             to_rows, to_columns = (np.array(to, np.int64) for to in zip(*ph.kick_to, strict=True))
             cross_together(
                 near, n, come, window, self.pixels, laws, self.work, to_rows, to_columns, ph.kick_wraps, ph.shape[1],
@@ -379,9 +342,9 @@ class Recording:
             cross_plainly(near, come, self.pixels, self.random, bits)
         else:
             cross(near, n, come, window, self.pixels, laws, self.work, ph.shape[1], self.random, bits)
-        for rows, columns in ph.kick_to if ph.kick and not ph.kick_at_spike else ():
+        for rows, columns in ph.kick_to if ph.late_kick else ():
             charge = self.pixels.charge.reshape(ph.shape)
-            give(charge, bits.reshape(ph.shape), ph.kick, rows, columns, ph.kick_wraps)
+            give(charge, bits.reshape(ph.shape), ph.late_kick, rows, columns, ph.kick_wraps)
         if ph.droop.size or ph.array_sag:
             share = bits.reshape(ph.shape).mean(axis=ph.droop_axis, keepdims=True)
             self.activity[:] = share

@@ -31,7 +31,7 @@ from tests.hidden_world.waves import Flashes, Switched
 
 
 def _ping_pong(ph: Physics, camera: Camera, frames: int, p: Parameters, rng: Rng) -> None:
-    ph.alternate = p["step"]
+    ph.laws = ph.laws._replace(alternate=p["step"])
 
 
 def _two_component_lag(ph: Physics, camera: Camera, frames: int, p: Parameters, rng: Rng) -> None:
@@ -79,7 +79,8 @@ def _array_sag(ph: Physics, camera: Camera, frames: int, p: Parameters, rng: Rng
 
 
 def _recovery_ramp(ph: Physics, camera: Camera, frames: int, p: Parameters, rng: Rng) -> None:
-    ph.ramp_loss, ph.ramp_tau, ph.substeps = p["loss"], p["tau_frames"], max(ph.substeps, RESET_SUBSTEPS)
+    ph.laws = ph.laws._replace(ramp_loss=p["loss"], ramp_tau=p["tau_frames"])
+    ph.substeps = max(ph.substeps, RESET_SUBSTEPS)
 
 
 def _flashes(ph: Physics, camera: Camera, frames: int, p: Parameters, rng: Rng) -> None:
@@ -146,11 +147,12 @@ def _saturation_memory(ph: Physics, camera: Camera, frames: int, p: Parameters, 
 
 
 def _distant_row_leak(ph: Physics, camera: Camera, frames: int, p: Parameters, rng: Rng) -> None:
-    ph.kick, ph.kick_to, ph.kick_wraps = p["kick"], ((int(p["rows_away"]), 0),), True
+    ph.laws = ph.laws._replace(kick=p["kick"])
+    ph.kick_to, ph.kick_wraps = ((int(p["rows_away"]), 0),), True
 
 
 def _heavy_tailed_reset(ph: Physics, camera: Camera, frames: int, p: Parameters, rng: Rng) -> None:
-    ph.outlier_share, ph.outlier_kappa = p["share"], p["kappa"]
+    ph.laws = ph.laws._replace(outlier_share=p["share"], outlier_kappa=p["kappa"])
 
 
 def _row_bus(bits: Bits, p: Parameters, rng: Rng) -> Bits:

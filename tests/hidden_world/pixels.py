@@ -53,27 +53,37 @@ class Pixels(NamedTuple):
 
 
 class Laws(NamedTuple):
-    """Laws of a crossing, as in `integrator.Physics`."""
+    """Laws of a crossing, which do nothing at their defaults.  Charge in thresholds, time in frames."""
 
-    dead: float
-    dead_by_light: float
-    delay: float
-    delay_power: float
-    delay_reports: float
-    hold_loss: float
-    hold_chance: float
-    left_always: float
-    left_fraction: float
-    left_tau: float
-    ramp_loss: float
-    ramp_tau: float
-    alternate: float
-    outlier_share: float
-    outlier_kappa: float
-    kick: float
-    ripple: float
-    ripple_cycles: float
-    ripple_phase: float
+    dead: float = 0.0
+    dead_by_light: float = 0.0
+    """of dead time, by charge a frame"""
+    delay: float = 0.0
+    """c of a delay c / x^delay_power"""
+    delay_power: float = 0.5
+    delay_reports: float = 1.0
+    """1 where a spike is of the frame in which the comparator trips, 0 where of its crossing"""
+    hold_loss: float = 0.0
+    """share lost of the charge between a crossing and the end of its frame"""
+    hold_chance: float = 1.0
+    """share of the resets that lose it"""
+    left_always: float = 0.0
+    """charge that a reset leaves at least; beside it left_fraction (1 - exp(-T / left_tau))"""
+    left_fraction: float = 0.0
+    left_tau: float = 1.0
+    ramp_loss: float = 0.0
+    """sensitivity lost just after a reset"""
+    ramp_tau: float = 1.0
+    alternate: float = 0.0
+    """every second threshold of a pixel is higher by this"""
+    outlier_share: float = 0.0
+    outlier_kappa: float = 0.0
+    kick: float = 0.0
+    """charge that a spike gives at once to the pixels `Physics.kick_to`"""
+    ripple: float = 0.0
+    """amplitude, cycles a frame and phase of a sine on the level of a reset, which its cycle keeps"""
+    ripple_cycles: float = 0.0
+    ripple_phase: float = 0.0
 
 
 class Window(NamedTuple):

@@ -71,7 +71,8 @@ def _ripples(*harmonics: tuple[float, float]) -> OnPhysics:
 
 
 def _ripple_of_reset(ph: Physics, camera: Camera, frames: int, p: Parameters, rng: Rng) -> None:
-    ph.reset_ripple = (p["ripple"], p["frequency_hz"] * FRAME_S, rng.random())
+    cycles = p["frequency_hz"] * FRAME_S
+    ph.laws = ph.laws._replace(ripple=p["ripple"], ripple_cycles=cycles, ripple_phase=rng.random())
     ph.substeps = max(ph.substeps, RESET_SUBSTEPS)
 
 
