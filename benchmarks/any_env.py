@@ -9,15 +9,12 @@ CartPole, its wrappers and the camera's.
 from __future__ import annotations
 
 import time
-from collections import defaultdict
-from collections.abc import Callable, Iterator
-from contextlib import ExitStack, contextmanager
 from typing import Any
-from unittest.mock import patch
 
 import gymnasium
 from gymnasium.envs.classic_control import CartPoleEnv
 
+from benchmarks.clocked import Clocked
 from spikecam_env.bench.machine import machine
 from spikecam_env.cli.table import table
 from spikecam_env.envs.light_between import RenderedLight
@@ -35,27 +32,7 @@ PARTS: dict[str, tuple[type, tuple[str, ...]]] = {
     "sensor": (SpikeSensor, ("step",)),
     "observation": (ObservedStream, ("step", "skip")),
 }
-"""Methods whose time is counted; that of light holds that of render."""
-
-
-@contextmanager
-def timed(spent: dict[str, float]) -> Iterator[None]:
-    """Add the processor's time [s] of every part to `spent`."""
-    with ExitStack() as patches:
-        for part, (owner, names) in PARTS.items():
-            for name in names:
-                patches.enter_context(patch.object(owner, name, _timed(getattr(owner, name), spent, part)))
-        yield
-
-
-def _timed(function: Callable[..., Any], spent: dict[str, float], part: str) -> Callable[..., Any]:
-    def call(*args: Any, **kwargs: Any) -> Any:
-        begin = time.process_time()
-        result = function(*args, **kwargs)
-        spent[part] += time.process_time() - begin
-        return result
-
-    return call
+"""Methods whose time is counted."""
 
 
 def measured(obs: str, block_frames: int) -> dict[str, Any]:
@@ -66,16 +43,15 @@ def measured(obs: str, block_frames: int) -> dict[str, Any]:
     env.reset(seed=0)
     env.step(0)  # compiles
     env.reset(seed=0)
-    spent: dict[str, float] = defaultdict(float)
-    with timed(spent):
+    clocked = Clocked(time.process_time)
+    with clocked.of((part, owner, name) for part, (owner, names) in PARTS.items() for name in names):
         begin, steps, over = time.process_time(), 0, False
         while steps < STEPS and not over:
             over = env.step(steps % 2)[2]
             steps += 1
         total = time.process_time() - begin
     env.close()
-    spent["light"] -= spent["render"]
-    own = {**{part: spent[part] for part in PARTS}, "rest": total - sum(spent.values())}
+    own = {**{part: clocked.seconds[part] for part in PARTS}, "rest": total - sum(clocked.seconds.values())}
     parts = {f"{part} [ms]": 1e3 * seconds / steps for part, seconds in own.items()}
     return {"obs": obs, "block": block_frames, "steps/s": steps / total, **parts}
 

@@ -10,6 +10,7 @@ from __future__ import annotations
 import json
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
 from typing import Any, Literal
 
@@ -19,6 +20,7 @@ from spikecam_env import stopping
 from spikecam_env.cli.main import run_parsed
 from spikecam_env.errors import InputError
 from spikecam_env.numbers import Count, Workers
+from spikecam_env.pool import spread
 from spikecam_env.run_folder import run_folder
 from spikecam_env.whole import reason
 from tests.hidden_world import record, trial
@@ -75,10 +77,9 @@ class BlindTrial:
                 self.part,
                 self.diagnose,
                 picked=picked,
-                jobs=self.jobs,
                 threads=self.threads,
                 keep=self.keep,
-                starting=stopping.without_interrupts,
+                spread=partial(spread, jobs=self.jobs),
             )
             with tqdm(total=len(picked), unit="case") as bar:
                 for done, _ in steps:
@@ -94,14 +95,7 @@ class BlindTrial:
         print(f"wrote {self.out / 'trial.json'} and {self.out / 'trial.md'}")
 
 
-def diagnosed(
-    campaign: Path,
-    model: str,
-    out: Path,
-    seed: int,
-    exclude: Sequence[str],
-    threads: int,
-) -> dict[str, Any]:
+def diagnosed(campaign: Path, model: str, out: Path, seed: int, exclude: Sequence[str], threads: int) -> dict[str, Any]:
     """`spikecam diagnose` as a trial wants it, its report included."""
     try:
         from spikecam_env.gap.diagnose import diagnose

@@ -11,19 +11,16 @@ Processor time, unlike time by the clock, does not depend on other work of the m
 from __future__ import annotations
 
 import time
-from collections import defaultdict
-from collections.abc import Callable, Iterator, Mapping
-from contextlib import ExitStack, contextmanager
-from dataclasses import dataclass, field
+from collections.abc import Iterator, Mapping
 from importlib import import_module
 from pathlib import Path
-from threading import local
 from types import SimpleNamespace
 from typing import Any, Literal
 from unittest.mock import patch
 
 import tyro
 
+from benchmarks.clocked import Clocked
 from spikecam_env.cli.table import markdown
 from tests.hidden_world.cases import Case, cases
 from tests.hidden_world.world import write_campaign
@@ -54,45 +51,16 @@ PAGE = "page"
 """The stage after a diagnosis: its files and the page with its pictures."""
 
 
-@dataclass
-class Clocked:
-    """Processor seconds of functions, each without the others that it calls."""
-
-    seconds: dict[str, float] = field(default_factory=lambda: defaultdict(float))
-    _open: local = field(default_factory=local)
-
-    def of(self, kernel: str, function: Callable[..., Any]) -> Callable[..., Any]:
-        """The function, clocked."""
-
-        def clocked(*args: Any, **options: Any) -> Any:
-            within = self._open.__dict__.setdefault("within", [])
-            within.append(0.0)
-            begin = time.thread_time()
-            try:
-                return function(*args, **options)
-            finally:
-                taken = time.thread_time() - begin
-                self.seconds[kernel] += taken - within.pop()
-                if within:
-                    within[-1] += taken
-
-        return clocked
-
-    @contextmanager
-    def all_kernels(self) -> Iterator[None]:
-        """Clock the functions of KERNELS meanwhile, and stages by processor time."""
-        with ExitStack() as stack:
-            for kernel, places in KERNELS.items():
-                for place in places:
-                    module, _, name = place.partition(":")
-                    owner: Any = import_module(f"spikecam_env.{module}")
-                    *outer, name = name.split(".")
-                    for part in outer:
-                        owner = getattr(owner, part)
-                    stack.enter_context(patch.object(owner, name, self.of(kernel, getattr(owner, name))))
-            stages = import_module("spikecam_env.gap.stages")
-            stack.enter_context(patch.object(stages, "time", SimpleNamespace(perf_counter=time.process_time)))
-            yield
+def places() -> Iterator[tuple[str, Any, str]]:
+    """Kernel, module or class, and name of each function of KERNELS."""
+    for kernel, named in KERNELS.items():
+        for place in named:
+            module, _, name = place.partition(":")
+            owner: Any = import_module(f"spikecam_env.{module}")
+            *outer, name = name.split(".")
+            for part in outer:
+                owner = getattr(owner, part)
+            yield kernel, owner, name
 
 
 def diagnosed(case: Case, folder: Path) -> tuple[dict[str, float], dict[str, float], str]:
@@ -101,7 +69,8 @@ def diagnosed(case: Case, folder: Path) -> tuple[dict[str, float], dict[str, flo
 
     clocked = Clocked()
     begin = time.process_time()
-    with clocked.all_kernels():
+    by_processor = patch("spikecam_env.gap.stages.time", SimpleNamespace(perf_counter=time.process_time))
+    with clocked.of(places()), by_processor:
         diagnosis = diagnose(folder, case.model, exclude=case.exclude, progress=False)
     middle = time.process_time()
     diagnosis.write(folder.with_name(f"{folder.name}_diagnosed"))

@@ -12,12 +12,7 @@ from spikecam_env.compiled import njit
 
 
 def supersampled(
-    disk: RotatingDisk,
-    texture: Texture,
-    background: float,
-    frame: float,
-    gaze: Gaze | None = None,
-    samples: int = 16,
+    disk: RotatingDisk, texture: Texture, background: float, frame: float, gaze: Gaze | None = None, samples: int = 16
 ) -> NDArray[np.float32]:
     """The radiance (H, W) at an instant.
 

@@ -25,10 +25,9 @@ from scenes.flat.sliding import SlidingTexture
 from scenes.keys import side_by_side
 from scenes.protocol import Scene
 from scenes.world import World
-from spikecam_env.bench.machine import FRAME_RATE_HZ, SHAPE
+from spikecam_env.bench.machine import SHAPE
 from spikecam_env.cli.bench import print_figures
 from spikecam_env.errors import InputError
-from spikecam_env.sensor import SpikeSensor
 
 BLOCK = 64
 """Frames of a call."""
@@ -55,7 +54,6 @@ def bench_scenes(names: Iterable[str] = (), seconds: float = 2.0) -> dict[str, R
         "planar scenes": lambda: bench_planar(seconds),
         f"space: {SPACE}": lambda: bench_space(seconds),
         "renderer back-ends": bench_renderers,
-        "end to end: light to noisy spikes": lambda: bench_end_to_end(seconds),
         "flow: frame 100 moved along it, against frame 140": lambda: flow_table(list(names) or list(SCENES)),
     }
     return {title: step() for title, step in tqdm(steps.items(), desc="bench", unit="table", leave=False)}
@@ -111,40 +109,6 @@ def bench_space(seconds: float = 2.0, name: str = SPACE, instants: int = 6) -> R
         moving.append(mask.mean())
     error = float(np.sqrt(np.mean(np.concatenate(squares)))) / full
     return [row | {"rms in motion, %": 100 * error, "moving, %": 100 * float(np.mean(moving))}]
-
-
-def bench_end_to_end(seconds: float = 2.0) -> Rows:
-    """Speed from scene to noisy spikes (model scsim, engine fast), in blocks of 64 frames.
-
-    Returns:
-        Rows of scene, frames/s, x real time (40 000 frames a second), light, % and camera, % of the time, keys a frame.
-    """
-    rows = []
-    for name, scene in {"disk": RotatingDisk(SHAPE), SPACE: make_scene(SPACE, SHAPE)}.items():
-        sensor = SpikeSensor("scsim", SHAPE, seed=0, engine="fast")
-        light_s = camera_s = 0.0
-        frames = keys = 0
-        while light_s + camera_s < seconds:
-            begin = time.perf_counter()
-            light = scene.radiance(sensor.frame, sensor.frame + BLOCK)
-            lit = time.perf_counter()
-            sensor.step(light, BLOCK)
-            end = time.perf_counter()
-            if sensor.frame > 2 * BLOCK:  # the first two blocks compile
-                light_s, camera_s = light_s + lit - begin, camera_s + end - lit
-                frames, keys = frames + BLOCK, keys + len(light.frame) - 1
-        total = light_s + camera_s
-        rows.append(
-            {
-                "scene": name,
-                "frames/s": frames / total,
-                "x real time": frames / total / FRAME_RATE_HZ,
-                "light, %": 100 * light_s / total,
-                "camera, %": 100 * camera_s / total,
-                "keys a frame": keys / frames,
-            }
-        )
-    return rows
 
 
 def flow_table(names: Iterable[str]) -> Rows:

@@ -1,4 +1,4 @@
-"""A workbench for the tests of the hidden world: small cameras with every number given."""
+"""A workbench for those who try the hidden world: small cameras with every number given."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from tests.hidden_world.integrator import Physics
 from tests.hidden_world.light import Light, Shot, flat
 from tests.hidden_world.mechanism import Hidden
 from tests.hidden_world.unit import CAPACITANCE_FF, SWING_V, Camera
@@ -40,12 +41,16 @@ def near(value: float, expected: float, tolerance: float) -> None:
 
 
 def filmed(
-    camera: Camera, light: Light | float, frames: int, hidden: Sequence[Hidden] = (), seed: int = 1
+    camera: Camera, light: Light | float, frames: int, hidden: Sequence[Hidden] = (), seed: int = 1, pieces: int = 0
 ) -> NDArray[np.uint8]:
-    """(frames, rows, columns) bits under a light, or a flat of that radiance."""
+    """(frames, rows, columns) bits under a light, or a flat of that radiance; pieces: of a frame, at least."""
     shown = light if isinstance(light, Light) else flat(light)
     recipe = Recipe(seed, "scsim", tuple(hidden), shape=camera.shape, frames=frames)
-    return film(recipe, camera, Shot("shot", "fit", shown))
+
+    def cut(physics: Physics) -> None:
+        physics.substeps = max(physics.substeps, pieces)
+
+    return film(recipe, camera, Shot("shot", "fit", shown), cut)
 
 
 def hidden(name: str, law: str = "", **parameters: float) -> Hidden:

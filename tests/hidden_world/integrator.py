@@ -9,8 +9,8 @@ when it is crossed (`pixels`).  While a pixel is far from its threshold its mean
 that stretch is owed.  Under steady light, with nothing that changes, `steady` leaps from crossing to crossing.
 
 Not within a frame, since their laws are of frames: noise drawn a frame (of all, of a row, of a pixel), the droop of
-a row that fired in the frame before, pictures of `gain_movie` and `dark_movie`.  A non-linearity, blooming, glare and
-traps act on the mean of a frame's light.
+a row that fired in the frame before, pictures of `gain_movie` and `dark_movie`.  A non-linearity, blooming and slow
+noise act on each piece of a frame that is cut (`substeps`), else on the whole; traps and glare on the mean of it.
 
 Every deviation is a field of `Physics` that does nothing at its default.
 """
@@ -46,7 +46,7 @@ Whole = NDArray[np.int64]
 
 BLOCK = 64
 """Frames whose windows are made at once."""
-NO_LAWS = Laws(0.0, 0.0, 0.0, 0.5, 0.0, 1.0, 0.0, 0.0, 1.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+NO_LAWS = Laws()
 """A crossing takes the threshold away, and no more."""
 
 
@@ -133,40 +133,18 @@ class Physics:
     """1: by rows, 0: by columns"""
     array_sag: float = 0.0
     sag_tau: float = 1.0
-    alternate: float = 0.0
-    """every second threshold of a pixel is higher by this"""
-    outlier_share: float = 0.0
-    outlier_kappa: float = 0.0
 
     substeps: int = 1
     """pieces that a frame is cut into at least, where light moves or sensitivity does"""
-    dead: float = 0.0
-    dead_by_light: float = 0.0
-    """of dead time, by charge a frame"""
+    laws: Laws = NO_LAWS
+    """of a crossing"""
     dead_share: Array | None = None
     """(P,) factor on the dead time of each pixel"""
-    delay: float = 0.0
-    """c of a delay c / x^delay_power"""
-    delay_power: float = 0.5
-    hold_loss: float = 0.0
-    """share lost of the charge between a crossing and the end of its frame"""
-    hold_chance: float = 1.0
-    """share of the resets that lose it"""
-    left_always: float = 0.0
-    """charge that a reset leaves at least; beside it left_fraction (1 - exp(-T / left_tau))"""
-    left_fraction: float = 0.0
-    left_tau: float = 1.0
-    ramp_loss: float = 0.0
-    """sensitivity lost just after a reset"""
-    ramp_tau: float = 1.0
-    reset_ripple: tuple[float, float, float] = (0.0, 0.0, 0.0)
-    """amplitude, cycles a frame and phase of a sine on the level of a reset, which its cycle keeps"""
-    kick: float = 0.0
-    """charge that a spike gives to the pixels `kick_to` (rows, columns) away"""
+    late_kick: float = 0.0
+    """charge that a spike gives at the end of its frame"""
     kick_to: tuple[tuple[int, int], ...] = ()
+    """(rows, columns) away of the pixels that a spike gives charge to"""
     kick_wraps: bool = False
-    kick_at_spike: bool = True
-    """at once, or else at the end of the frame"""
 
     @property
     def light_is_steady(self) -> bool:
@@ -178,14 +156,11 @@ class Physics:
     def is_steady(self) -> bool:
         """Whether nothing at all changes in time, and a reset only takes the threshold away."""
         waves = (self.dark_movie, self.row_mv, self.column_mv, self.clock)
-        scalars = (
-            self.array_sag, self.alternate, self.outlier_share, self.dead, self.delay, self.hold_loss,
-            self.left_fraction, self.ramp_loss, self.kick, self.reset_ripple[0],
-        )  # fmt: skip
         events = self.dark_steps[0].size + self.hits[0].size + self.slow_mv.size
         events += self.droop.size + self.frame_noise_mv.size
         moving = self.dark_waves or self.threshold_waves or any(a is not None for a in waves)
-        return self.light_is_steady and not moving and not any(scalars) and not events
+        events += bool(self.array_sag) + bool(self.late_kick)
+        return self.light_is_steady and not moving and not events and self.laws == NO_LAWS
 
     @property
     def margin(self) -> float:
@@ -197,17 +172,8 @@ class Physics:
             millivolts += -float(self.clock.height(np.zeros(1))[0])
         wave = sum(abs(w.amplitude) for w in self.threshold_waves)
         common = 1.2 * (wave + float(np.abs(self.droop).max(initial=0.0)) + abs(self.array_sag))
-        kicks = 2.0 * len(self.kick_to) * abs(self.kick) if self.kick_at_spike else 0.0
+        kicks = 2.0 * len(self.kick_to) * abs(self.laws.kick)
         return float(0.005 + 7.0 * np.sqrt(self.quiet.max()) + millivolts * self.per_mv.max() + common + kicks)
-
-    @property
-    def laws(self) -> Laws:
-        """The laws of a crossing."""
-        return Laws(
-            self.dead, self.dead_by_light, self.delay, self.delay_power, self.hold_loss, self.hold_chance,
-            self.left_always, self.left_fraction, self.left_tau, self.ramp_loss, self.ramp_tau, self.alternate,
-            self.outlier_share, self.outlier_kappa, self.kick if self.kick_at_spike else 0.0, *self.reset_ripple,
-        )  # fmt: skip
 
 
 class Windows:
@@ -228,7 +194,8 @@ class Windows:
         light_moves = bool(self.light) or ph.light_leak is not None
         self.alike = not light_moves and not ph.threshold_waves and ph.edge is None
         within = self.moving_threshold or ph.substeps > 1
-        even = ph.substeps if ph.ramp_loss or not ph.light_is_steady else 1
+        moving = ph.laws.ramp_loss or ph.slow_mv.size or ph.threshold_waves or not ph.light_is_steady
+        even = ph.substeps if moving else 1
         self.pieces = max([even, *(_pieces(w.cycles) for w in ph.threshold_waves)])
         self.light_within = light_moves and (within or bool(ph.lags))
         self.first = self.stop = -1
@@ -315,7 +282,7 @@ class Recording:
         self.dark = ph.dark.copy()
         self.late = [ph.gain * ph.key_light[0].astype(np.float64) for _ in ph.lags]
         self.traps = np.zeros(count)
-        self.glare = np.zeros(count)
+        self.glare = np.zeros((count, 1))
         self.slow = rng.standard_normal((count, ph.slow_mv.size))
         self.slow_at = np.zeros(count, np.int64)
         self.slow_kept = np.exp(-np.arange(1024)[:, None] / ph.slow_tau[None, :])
@@ -327,6 +294,9 @@ class Recording:
         self.windows = Windows(ph)
         self.row_of = np.arange(count) // ph.shape[1] * int(self.windows.early.size > 1)
         self.mean, self.tilt = np.zeros(count), np.zeros(count)
+        bent = ph.lags or ((ph.response or ph.bloom_share) and self.windows.light_within)
+        self.bends = bool(bent) and not ph.light_is_steady
+        self.within = np.zeros((0, 0))
         self.key = 0
 
     def resume(self, before: Recording) -> Recording:
@@ -359,21 +329,22 @@ class Recording:
         self, n: int, light: Array, dark: Array, window: Window, margin: float, laws: Laws, bits: NDArray[np.uint8]
     ) -> None:
         ph = self.physics
-        near = self.near[: coast(self.pixels, ph.ramp_tau, margin, light, dark, self.near)]
-        come = Come(light, self.tilt, dark, *self._thresholds(n, near))
-        if ph.kick and ph.kick_at_spike:
+        near = self.near[: coast(self.pixels, laws.ramp_tau, margin, light, dark, self.near)]
+        come = Come(light, self.within, self.tilt, dark, *self._thresholds(n, near, window))
+        if laws.kick:
             to_rows, to_columns = (np.array(to, np.int64) for to in zip(*ph.kick_to, strict=True))
             cross_together(
                 near, n, come, window, self.pixels, laws, self.work, to_rows, to_columns, ph.kick_wraps, ph.shape[1],
                 self.random, bits,
             )  # fmt: skip
-        elif not self.windows.moving_threshold and laws == NO_LAWS:  # when in the frame it crosses is all one
+        elif come.shift.shape[1] == 1 and not self.windows.moving_threshold and laws == NO_LAWS:
+            # when in the frame it crosses is all one
             cross_plainly(near, come, self.pixels, self.random, bits)
         else:
             cross(near, n, come, window, self.pixels, laws, self.work, ph.shape[1], self.random, bits)
-        for rows, columns in ph.kick_to if ph.kick and not ph.kick_at_spike else ():
+        for rows, columns in ph.kick_to if ph.late_kick else ():
             charge = self.pixels.charge.reshape(ph.shape)
-            give(charge, bits.reshape(ph.shape), ph.kick, rows, columns, ph.kick_wraps)
+            give(charge, bits.reshape(ph.shape), ph.late_kick, rows, columns, ph.kick_wraps)
         if ph.droop.size or ph.array_sag:
             share = bits.reshape(ph.shape).mean(axis=ph.droop_axis, keepdims=True)
             self.activity[:] = share
@@ -397,33 +368,52 @@ class Recording:
         return float(value[0]) if value.size == 1 else value[self.row_of]
 
     def _photocharge(self, n: int, of: tuple[Window, Array, Array, float]) -> Array:
-        """Charge (P,) that the light of frame n brings."""
+        """Charge (P,) that the light of frame n brings; leaves that of each piece in `within`."""
         ph, window = self.physics, of[0]
         radiance = self._radiance(n, *of)
         x = ph.gain * radiance
         if ph.gain_movie is not None:
             x = x * ph.gain_movie[min(n // ph.gain_every, len(ph.gain_movie) - 1)]
-        if ph.lags and not ph.light_is_steady:
-            total = (1.0 - sum(share for share, _ in ph.lags)) * x
+        light, span = x[:, None], np.ones((1, 1))
+        if self.bends:
+            row = self.row_of if window.start.size > 1 else slice(1)
+            u = window.u[row]
+            light = light * (window.light[row] + self.tilt[:, None] * np.diff(u * u - u, axis=1))
+            span = np.maximum(np.diff(u, axis=1), 1e-12)
+        if ph.lags and self.bends:
+            every, light = light, (1.0 - sum(share for share, _ in ph.lags)) * light
             for late, (share, tau) in zip(self.late, ph.lags, strict=True):
-                lagged(x, self.tilt, late, share, tau, ph.lag_fills_at_once, window, self.row_of, total)
-            x = total
+                lagged(every, span, np.exp(-span / tau), late, share, tau, ph.lag_fills_at_once, light)
         if ph.glare_loss:
-            bright = x > 1.0
+            bright = light.sum(axis=1, keepdims=True) > 1.0
             self.glare = np.where(bright, 1.0, self.glare * np.exp(-1.0 / ph.glare_tau))
-            x = np.where(bright, x, x * (1.0 - ph.glare_loss * self.glare))
-        if ph.response is not None:
-            x = ph.response(x)
-        if ph.bloom_share:
-            spill = ph.bloom_share * np.maximum(x - ph.bloom_full, 0.0)
-            x = x - spill
-            for way in ph.bloom_to if spill.any() else ():
-                give(x.reshape(ph.shape), spill.reshape(ph.shape), 1.0 / len(ph.bloom_to), *way, False)
+            light = np.where(bright, light, light * (1.0 - ph.glare_loss * self.glare))
+        if ph.response is not None or ph.bloom_share:
+            light = self._bent(light / span) * span
+        if self.bends:
+            self.within = light
+        x = light.sum(axis=1)
         if ph.trap_charge:
             full = radiance / (radiance + ph.trap_half)
             self.traps = full + (self.traps - full) * np.exp(-1.0 / ph.trap_tau)
             x = x + ph.trap_charge * self.traps
         return np.maximum(x, 0.0)
+
+    def _bent(self, x: Array) -> Array:
+        """Charge a frame (P, S) of light that would bring x, after the response and blooming."""
+        ph, (rows, columns) = self.physics, self.physics.shape
+        if ph.response is not None:
+            x = ph.response(x)
+        if ph.bloom_share:
+            spill = ph.bloom_share * np.maximum(x - ph.bloom_full, 0.0)
+            if not spill.any():
+                return x
+            x = x - spill
+            beyond = np.pad(spill.reshape(rows, columns, -1), ((1, 1), (1, 1), (0, 0)))
+            for down, right in ph.bloom_to:
+                given = beyond[1 - down : rows + 1 - down, 1 - right : columns + 1 - right]
+                x += 1.0 / len(ph.bloom_to) * given.reshape(x.shape)
+        return x
 
     def _dark_of(self, n: int, of: tuple[Window, Array, Array, float]) -> Array:
         """Charge (P,) that comes without light in frame n."""
@@ -435,24 +425,28 @@ class Recording:
             dark = dark * ph.dark_movie[min(n // ph.dark_every, len(ph.dark_movie) - 1)]
         return dark if of[3] == 1.0 else dark * of[3]
 
-    def _thresholds(self, n: int, near: Whole) -> tuple[Array, Array]:
-        """Factor on, and addition to, the thresholds of the pixels `near` in frame n, the whole frame long."""
+    def _thresholds(self, n: int, near: Whole, window: Window) -> tuple[Array, Array]:
+        """Factor on the thresholds of the pixels `near` in frame n, (P near,), and addition as of `Come.shift`."""
         ph = self.physics
         stretch = np.ones(near.size)
         if ph.array_sag:
             stretch *= 1.0 + self.sag
         if ph.droop.size:
             stretch *= 1.0 + ph.droop[near] * self.activity.reshape(-1)[near]
-        millivolt = np.zeros(near.size)
+        cuts = window.u.shape[1] if ph.slow_mv.size and ph.substeps > 1 else 1
+        millivolt = np.zeros((near.size, cuts))
         if ph.row_mv is not None:
-            millivolt += ph.row_mv[n][near // ph.shape[1]]
+            millivolt += ph.row_mv[n][near // ph.shape[1], None]
         if ph.column_mv is not None:
-            millivolt += ph.column_mv[n][near % ph.shape[1]]
+            millivolt += ph.column_mv[n][near % ph.shape[1], None]
         if ph.frame_noise_mv.size:
-            millivolt += ph.frame_noise_mv[near] * self.rng.standard_normal(near.size)
+            millivolt += (ph.frame_noise_mv[near] * self.rng.standard_normal(near.size))[:, None]
         if ph.slow_mv.size:
-            slow_noise(near, n, self.slow, self.slow_at, self.slow_kept, ph.slow_mv, self.random, millivolt)
-        return stretch, millivolt * ph.per_mv[near]
+            slow_noise(
+                near, n, window.u, ph.shape[1], self.slow, self.slow_at, self.slow_kept, ph.slow_tau, ph.slow_mv,
+                self.random, millivolt,
+            )  # fmt: skip
+        return stretch, millivolt * ph.per_mv[near, None]
 
 
 def _events(events: tuple[Array, Whole, Array], target: Array) -> Callable[[int], None]:

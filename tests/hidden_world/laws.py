@@ -10,7 +10,6 @@ from pathlib import Path
 from tests.hidden_world.catalogue import BASE_EFFECTS, CATALOGUE
 
 PAGE = Path(__file__).resolve().parents[2] / "docs" / "blind_trial.md"
-BEGIN, END = "<!-- laws: begin -->\n", "<!-- laws: end -->\n"
 
 
 def table() -> str:
@@ -26,10 +25,19 @@ def _row(*cells: str) -> str:
     return "| " + " | ".join(cell.replace("|", "\\|") for cell in cells) + " |"
 
 
+def between(page: str, name: str, text: str) -> str:
+    """The page with this text between its markers; raises ValueError unless it has both lines once, in this order."""
+    begin, end = (f"<!-- {name}: {side} -->\n" for side in ("begin", "end"))
+    before, found, rest = page.partition(begin)
+    _, closed, after = rest.partition(end)
+    if not found or not closed or begin in rest or end in before + after:
+        raise ValueError(f"it must hold the lines {begin.strip()} and {end.strip()} once, in this order")
+    return before + begin + text + end + after
+
+
 def with_table(page: str) -> str:
     """The page with the table in its place."""
-    before, rest = page.split(BEGIN)
-    return before + BEGIN + table() + END + rest.split(END)[1]
+    return between(page, "laws", table())
 
 
 if __name__ == "__main__":

@@ -58,13 +58,9 @@ class Law:
 
 @dataclass(frozen=True)
 class Mechanism(Law):
-    """A mechanism by its name in limits.toml.  It is its own near law; `far` are the others.
-
-    describe: words of a right description (outside the catalogue).  signs: of the strength.
-    """
+    """A mechanism by its name in limits.toml.  It is its own near law, `far` are others.  signs: of its strength."""
 
     far: tuple[Law, ...] = ()
-    describe: str = ""
     signs: tuple[float, ...] = (1.0,)
 
     def by(self, law: str) -> Law:

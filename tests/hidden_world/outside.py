@@ -1,4 +1,4 @@
-"""Mechanisms that no catalogue of the diagnosis holds; each has words of a right description.
+"""Mechanisms that no catalogue of the diagnosis holds.
 
 Two disjoint lists: TUNE may be looked at while a diagnosis is made, REPORT only when it is judged.
 """
@@ -25,13 +25,13 @@ from tests.hidden_world.integrator import Physics
 from tests.hidden_world.light import Light
 from tests.hidden_world.mechanism import Bits, Mechanism, Parameters, Rng
 from tests.hidden_world.unit import FRAME_S, Camera
-from tests.hidden_world.waves import Flashes, Pulses
+from tests.hidden_world.waves import Flashes, Switched
 
 # ---- to tune on
 
 
 def _ping_pong(ph: Physics, camera: Camera, frames: int, p: Parameters, rng: Rng) -> None:
-    ph.alternate = p["step"]
+    ph.laws = ph.laws._replace(alternate=p["step"])
 
 
 def _two_component_lag(ph: Physics, camera: Camera, frames: int, p: Parameters, rng: Rng) -> None:
@@ -63,7 +63,7 @@ def _amp_glow(camera: Camera, p: Parameters, rng: Rng) -> Camera:
 def _shutter(ph: Physics, camera: Camera, frames: int, p: Parameters, rng: Rng) -> None:
     """Shut for `closed` of the time, once a period, at any moments."""
     period = p["period_frames"]
-    ph.light_waves += (Pulses(period, p["closed"] * period, rng.uniform(0.0, period)),)
+    ph.light_waves += (Switched(period, p["closed"] * period, rng.uniform(0.0, period), 0.0, 1.0),)
 
 
 def _even_rows(ph: Physics, camera: Camera, frames: int, p: Parameters, rng: Rng) -> None:
@@ -79,7 +79,8 @@ def _array_sag(ph: Physics, camera: Camera, frames: int, p: Parameters, rng: Rng
 
 
 def _recovery_ramp(ph: Physics, camera: Camera, frames: int, p: Parameters, rng: Rng) -> None:
-    ph.ramp_loss, ph.ramp_tau, ph.substeps = p["loss"], p["tau_frames"], max(ph.substeps, RESET_SUBSTEPS)
+    ph.laws = ph.laws._replace(ramp_loss=p["loss"], ramp_tau=p["tau_frames"])
+    ph.substeps = max(ph.substeps, RESET_SUBSTEPS)
 
 
 def _flashes(ph: Physics, camera: Camera, frames: int, p: Parameters, rng: Rng) -> None:
@@ -146,11 +147,12 @@ def _saturation_memory(ph: Physics, camera: Camera, frames: int, p: Parameters, 
 
 
 def _distant_row_leak(ph: Physics, camera: Camera, frames: int, p: Parameters, rng: Rng) -> None:
-    ph.kick, ph.kick_to, ph.kick_wraps = p["kick"], ((int(p["rows_away"]), 0),), True
+    ph.laws = ph.laws._replace(kick=p["kick"])
+    ph.kick_to, ph.kick_wraps = ((int(p["rows_away"]), 0),), True
 
 
 def _heavy_tailed_reset(ph: Physics, camera: Camera, frames: int, p: Parameters, rng: Rng) -> None:
-    ph.outlier_share, ph.outlier_kappa = p["share"], p["kappa"]
+    ph.laws = ph.laws._replace(outlier_share=p["share"], outlier_kappa=p["kappa"])
 
 
 def _row_bus(bits: Bits, p: Parameters, rng: Rng) -> Bits:
@@ -205,12 +207,7 @@ def _repeated_frames(bits: Bits, p: Parameters, rng: Rng) -> Bits:
 TUNE = {
     m.name: m
     for m in (
-        Mechanism(
-            "ping_pong_threshold",
-            "every second threshold of a pixel is higher",
-            physics=_ping_pong,
-            describe="history: successive intervals alternate, in light and dark, static, local",
-        ),
+        Mechanism("ping_pong_threshold", "every second threshold of a pixel is higher", physics=_ping_pong),
         Mechanism(
             "two_component_lag",
             "a fast and a slow part of the light come late",
@@ -218,63 +215,54 @@ TUNE = {
                 fast_share=between(0.4, 0.6), fast_frames=log_uniform(3.0, 8.0), slow_frames=log_uniform(80.0, 250.0)
             ),
             physics=_two_component_lag,
-            describe="light that changes: a tail with two time scales, in proportion to light",
         ),
         Mechanism(
             "column_clock_modulation",
             "the reference of each column swings with a clock, each with a phase of its own",
             shape(period_frames=between(5.0, 12.0), phases=whole(0, 2**31)),
             physics=_column_clock,
-            describe="columns: a line at a few kHz in every column, none in the whole array, light and dark",
         ),
         Mechanism(
             "spike_bursts",
             "a spike is now and then followed by several, frame by frame",
             shape(length=whole(3, 5)),
             bits=_bursts,
-            describe="history: runs of successive spikes, rare, at random, in proportion to the spikes",
         ),
         Mechanism(
             "amp_glow",
             "dark current that falls off from a corner",
             shape(reach_pixels=between(6.0, 14.0)),
             camera=_amp_glow,
-            describe="dark: one corner, static",
         ),
         Mechanism(
             "duty_cycled_shutter",
             "light shut off for a moment every period",
             shape(period_frames=between(20.0, 60.0)),
             physics=_shutter,
-            describe="light: common, periodic, with harmonics (pulses, not a sine)",
         ),
         Mechanism(
             "even_row_gain_switching",
             "even and odd rows change gain in turns",
             shape(every_frames=whole(100, 400)),
             physics=_even_rows,
-            describe="light: even against odd rows, switching to and fro in time",
         ),
         Mechanism(
             "array_sag",
             "all thresholds follow the activity of the whole array, slowly",
             shape(tau_frames=log_uniform(30.0, 150.0)),
             physics=_array_sag,
-            describe="common: follows the mean level of the scene with a time constant, also in dark pixels",
         ),
         Mechanism(
             "recovery_ramp",
             "sensitivity comes back gradually after a reset",
             shape(tau_frames=between(2.0, 6.0)),
             physics=_recovery_ramp,
-            describe="level dependent: light lost after each reset, saturating for intervals beyond a few frames",
         ),
         Mechanism(
             "light_leak_flashes",
             "flashes of stray light at random times",
             shape(per_second=between(60.0, 150.0), tau_frames=between(8.0, 40.0)),
             physics=_flashes,
-            describe="common, also in the dark: bursts at random times, the same charge at all levels",
         ),
     )
 }
@@ -287,88 +275,63 @@ REPORT = {
             "traps fill in the light, saturate, and leak over 100 ms; empty when a recording starts",
             shape(tau_ms=log_uniform(40.0, 150.0), half_radiance=between(0.03, 0.1)),
             physics=_persistence,
-            describe="light: an additive charge that builds up slowly from the start and saturates with level",
         ),
         Mechanism(
             "alternate_frame_comparator",
             "in some pixels the comparator looks only every second frame",
             shape(which=whole(0, 2**31)),
             bits=_alternate_frames,
-            describe="some pixels: spikes only in even frames",
         ),
         Mechanism(
             "moving_hot_band",
             "a warm band moves across the chip and raises its dark current",
             shape(travel=between(0.5, 1.0), width_pixels=between(5.0, 9.0)),
             physics=_hot_band,
-            describe="dark: columns, a place that moves during a recording",
         ),
         Mechanism(
             "cosmic_streaks",
             "charge along straight tracks in single frames",
             shape(charge=between(0.3, 0.7)),
             physics=_streaks,
-            describe="rare events in space and time: pixels on a line fire early together, dark too",
         ),
-        Mechanism(
-            "ghost_image",
-            "a faint image turned by 180 degrees",
-            light=_ghost,
-            describe="light: non-local, textured scenes only, mirrored through the middle",
-        ),
+        Mechanism("ghost_image", "a faint image turned by 180 degrees", light=_ghost),
         Mechanism(
             "saturation_memory",
             "less sensitive for a while after more than one threshold a frame",
             shape(tau_frames=between(15.0, 60.0)),
             physics=_saturation_memory,
-            describe="light that changes: after bright light only, recovering over tens of frames",
         ),
         Mechanism(
             "distant_row_leak",
             "a spike gives charge to a pixel far away in its column",
             shape(rows_away=whole(8, 31)),
             physics=_distant_row_leak,
-            describe="coincidences of pixels a fixed number of rows apart, at lag 1; neighbours have none",
         ),
         Mechanism(
             "heavy_tailed_reset",
             "a reset now and then misses widely",
             shape(kappa=between(0.06, 0.12)),
             physics=_heavy_tailed_reset,
-            describe="interval noise with outliers on both sides, at all levels",
         ),
-        Mechanism(
-            "row_bus_limit",
-            "a row's bus carries so many spikes a frame, the others wait",
-            bits=_row_bus,
-            describe="bright rows: spikes late by a frame, towards the right, beyond an activity of the row",
-        ),
+        Mechanism("row_bus_limit", "a row's bus carries so many spikes a frame, the others wait", bits=_row_bus),
         Mechanism(
             "speckle",
             "the light on each pixel fluctuates by itself",
             shape(tau_frames=log_uniform(30.0, 200.0)),
             physics=_speckle,
-            describe="light: local, in proportion to light, one time constant; none in the dark",
         ),
         Mechanism(
             "fringes",
             "oblique stripes of sensitivity",
             shape(period_pixels=between(6.0, 14.0), angle=between(0.4, 1.1)),
             camera=_fringes,
-            describe="light: a static pattern, periodic in space, oblique",
         ),
-        Mechanism(
-            "repeated_frames",
-            "now and then the frame before is read again",
-            bits=_repeated_frames,
-            describe="single frames equal to the one before, all pixels",
-        ),
+        Mechanism("repeated_frames", "now and then the frame before is read again", bits=_repeated_frames),
         Mechanism(
             "missing_slot",
             "in some columns one frame of sixteen reports nothing, the spike comes a frame later",
             shape(which=whole(0, 2**31)),
             bits=_missing_slot,
-            describe="columns: periodic in time, sixteen frames",
         ),
     )
 }

@@ -1,9 +1,13 @@
 """The hidden world's pixel in continuous time, compiled.
 
 A frame of a pixel is its window from one read-out to the next, 0 <= u <= 1, cut at `Window.u` where something moves
-within it; between two cuts light and threshold are straight lines, charge a Brownian path.
+within it; between two cuts light and threshold are straight lines.  Charge is a Brownian path, or where electrons are
+few (`FEW`) a step an electron, each at its moment.
 
     q >= bar at u_c  ->  spike; q is the charge after u_c.  Light that comes while the node is held is lost, noise too.
+
+A threshold that comes down to the charge leaves nothing of it.  The excess stays where an electron takes the charge
+over it, and by convention where a threshold that is drawn anew for a frame is below it.
 
 Near its threshold only: a pixel leaps over all cuts that no noise of seven deviations can make it cross.
 """
@@ -22,6 +26,8 @@ Whole = NDArray[np.int64]
 
 NEVER = 2.0
 """Later than any moment of a window."""
+FEW = 1e-3
+"""1/N from which electrons are counted one by one: 1000 of them to a threshold, whose skewness is 3 %."""
 
 
 class Pixels(NamedTuple):
@@ -47,26 +53,37 @@ class Pixels(NamedTuple):
 
 
 class Laws(NamedTuple):
-    """Laws of a crossing, as in `integrator.Physics`."""
+    """Laws of a crossing, which do nothing at their defaults.  Charge in thresholds, time in frames."""
 
-    dead: float
-    dead_by_light: float
-    delay: float
-    delay_power: float
-    hold_loss: float
-    hold_chance: float
-    left_always: float
-    left_fraction: float
-    left_tau: float
-    ramp_loss: float
-    ramp_tau: float
-    alternate: float
-    outlier_share: float
-    outlier_kappa: float
-    kick: float
-    ripple: float
-    ripple_cycles: float
-    ripple_phase: float
+    dead: float = 0.0
+    dead_by_light: float = 0.0
+    """of dead time, by charge a frame"""
+    delay: float = 0.0
+    """c of a delay c / x^delay_power"""
+    delay_power: float = 0.5
+    delay_reports: float = 1.0
+    """1 where a spike is of the frame in which the comparator trips, 0 where of its crossing"""
+    hold_loss: float = 0.0
+    """share lost of the charge between a crossing and the end of its frame"""
+    hold_chance: float = 1.0
+    """share of the resets that lose it"""
+    left_always: float = 0.0
+    """charge that a reset leaves at least; beside it left_fraction (1 - exp(-T / left_tau))"""
+    left_fraction: float = 0.0
+    left_tau: float = 1.0
+    ramp_loss: float = 0.0
+    """sensitivity lost just after a reset"""
+    ramp_tau: float = 1.0
+    alternate: float = 0.0
+    """every second threshold of a pixel is higher by this"""
+    outlier_share: float = 0.0
+    outlier_kappa: float = 0.0
+    kick: float = 0.0
+    """charge that a spike gives at once to the pixels `Physics.kick_to`"""
+    ripple: float = 0.0
+    """amplitude, cycles a frame and phase of a sine on the level of a reset, which its cycle keeps"""
+    ripple_cycles: float = 0.0
+    ripple_phase: float = 0.0
 
 
 class Window(NamedTuple):
@@ -84,17 +101,20 @@ class Window(NamedTuple):
 
 
 class Work(NamedTuple):
-    """Pixels under way in a frame, (P,) each: their window's row; the piece, the charge to come in it from `begin` to
-    `end`; the moment of their next event, and their seat in the queue of these; the place of a pixel among those near.
+    """Pixels under way in a frame, (P,) each: their window's row; the piece and its charge a frame; the charge to come
+    evenly from `begin` to `end`, and all at once at `end` (an electron); the moment of their next event, and their seat
+    in the queue of these; the place of a pixel among those near.
     """
 
     row: Whole
     piece: Whole
     entered: NDArray[np.bool_]
+    rate: Array
     begin: Array
     end: Array
     charge: Array
     rest: Array
+    due: Array
     kept: Array
     open: Array
     moment: Array
@@ -104,10 +124,12 @@ class Work(NamedTuple):
 
 
 class Come(NamedTuple):
-    """The charge of this frame.  light, dark: (P,) charge.  tilt: (P,) half the light's change over its mean.
-    stretch, shift: (P near,) on and to the thresholds, for the whole frame."""
+    """The charge of this frame.  light, dark: (P,) charge.  within: (P, S) that of light in each piece, or (0, 0) where
+    it follows from `Window.light` and the tilt: (P,) half the light's change over its mean.
+    stretch: (P near,) on the thresholds.  shift: (P near, 1 or S + 1) to them, for the whole frame or at each cut."""
 
     light: Array
+    within: Array
     tilt: Array
     dark: Array
     stretch: Array
@@ -124,7 +146,7 @@ def new_work(pixels: int) -> Work:
         return np.zeros(pixels)
 
     return Work(
-        whole(), whole(), np.zeros(pixels, np.bool_), real(), real(), real(), real(), real(), real(),
+        whole(), whole(), np.zeros(pixels, np.bool_), real(), real(), real(), real(), real(), real(), real(), real(),
         real(), whole(), whole(), np.full(pixels, -1, np.int64),
     )  # fmt: skip
 
@@ -164,18 +186,20 @@ def _uniform(random):
 
 
 @njit(cache=True, **PLAIN)
-def _collected(mean, quiet, random):
-    """Charge that arrives as electrons, given its mean."""
-    if quiet == 0.0 or mean <= 0.0:
+def _collected(mean, quantum, random):
+    """Charge that arrives as electrons of `quantum` each, given its mean."""
+    if quantum == 0.0 or mean <= 0.0:
         return mean
-    electrons = mean / quiet
-    if electrons > 16.0:
-        return mean + np.sqrt(mean * quiet) * _gauss(random)
-    limit, product, count = np.exp(-electrons), _uniform(random), 0
-    while product > limit:
-        product *= _uniform(random)
-        count += 1
-    return count * quiet
+    electrons, count = mean / quantum, 0
+    if electrons > 16.0 and quantum < FEW:
+        return mean + np.sqrt(mean * quantum) * _gauss(random)
+    while electrons > 0.0:
+        limit, product = np.exp(-min(electrons, 16.0)), _uniform(random)
+        while product > limit:
+            product *= _uniform(random)
+            count += 1
+        electrons -= 16.0
+    return count * quantum
 
 
 @njit(cache=True, **PLAIN)
@@ -188,7 +212,7 @@ def steady(pixels, x, random, spikes):
         q, bar, n = charge[p] + _collected(owed[p], quiet[p], random) - owed[p], pixels.threshold[p], 0
         owed[p] = 0.0
         reserve = 0.005 + 7.0 * np.sqrt(quiet[p])
-        many, spread = x[p] > 16.0 * quiet[p], np.sqrt(x[p] * quiet[p])
+        many, spread = x[p] > 16.0 * quiet[p] and quiet[p] < FEW, np.sqrt(x[p] * quiet[p])
         while n < frames:
             if q + x[p] + reserve < bar:
                 leap = min(int((bar - q - reserve) / x[p]), frames - n)
@@ -226,16 +250,22 @@ def coast(pixels, ramp_tau, margin, light, dark, near):
 
 
 @njit(cache=True, **PLAIN)
-def slow_noise(near, n, slow, slow_at, kept, sd, random, total):
-    """Add the slow noise of the pixels `near` in frame n; it moves on over all frames since the last look."""
+def slow_noise(near, n, u, columns, slow, slow_at, kept, tau, sd, random, total):
+    """Add the slow noise of the pixels `near` in frame n, total (P near, 1), or at its cuts u, (P near, S + 1).
+
+    It moves on over all frames since the last look.
+    """
+    cuts = total.shape[1]
     for i in range(near.size):
         p = near[i]
+        r = p // columns if u.shape[0] > 1 else 0
         gone = min(n - slow_at[p], kept.shape[0] - 1)
-        slow_at[p] = n
-        for j in range(sd.size):
-            k = kept[gone, j]
-            slow[p, j] = k * slow[p, j] + np.sqrt(1.0 - k * k) * _gauss(random)
-            total[i] += sd[j] * slow[p, j]
+        slow_at[p] = n if cuts == 1 else n + 1
+        for k in range(cuts):
+            for j in range(sd.size):
+                left = kept[gone, j] if k == 0 else np.exp((u[r, k - 1] - u[r, k]) / tau[j])
+                slow[p, j] = left * slow[p, j] + np.sqrt(1.0 - left * left) * _gauss(random)
+                total[i, k] += sd[j] * slow[p, j]
 
 
 @njit(cache=True, **PLAIN)
@@ -303,22 +333,20 @@ def _between(keys, t, first):
 
 
 @njit(cache=True, **PLAIN)
-def lagged(x, tilt, late, share, tau, fills_at_once, window, rows_of, total):
-    """Add to `total` the charge of a late part, share h_tau * x, of this frame; late (P,) is its rate, moved on.
+def lagged(light, span, kept, late, share, tau, fills_at_once, total):
+    """Add to `total` (P, S) the charge of a late part, share h_tau * light, in each piece; late (P,) is its rate.
 
-    Within a piece light is constant, and the part relaxes towards it: exact; or is there at once, where it is more.
+    kept: of a difference after each piece, exp(-span / tau).  Within a piece light is constant, and the part relaxes
+    towards it: exact; or is there at once, where it is more.
     """
-    pieces = window.light.shape[1]
-    for p in range(x.size):
-        r = rows_of[p]
-        for s in range(pieces):
-            a, b = window.u[r, s], window.u[r, s + 1]
-            rate = x[p] * (window.light[r, s] + tilt[p] * ((b * b - b) - (a * a - a))) / (b - a)
-            kept = np.exp(-(b - a) / tau)
+    for p in range(light.shape[0]):
+        r = p if span.shape[0] > 1 else 0
+        for s in range(light.shape[1]):
+            rate = light[p, s] / span[r, s]
             if fills_at_once and rate > late[p]:
                 late[p] = rate
-            total[p] += share * (rate * (b - a) + (late[p] - rate) * tau * (1.0 - kept))
-            late[p] = rate + (late[p] - rate) * kept
+            total[p, s] += share * (light[p, s] + (late[p] - rate) * tau * (1.0 - kept[r, s]))
+            late[p] = rate + (late[p] - rate) * kept[r, s]
 
 
 @njit(cache=True, **PLAIN)
@@ -331,12 +359,12 @@ def cross_plainly(near, come, pixels, random, bits):
         x = light[p] + dark[p]
         q = charge[p] - owed[p] + _collected(owed[p], quiet[p], random) + _collected(x, quiet[p], random)
         owed[p] = 0.0
-        bar = threshold[p] * stretch[i] + shift[i]
+        bar = threshold[p] * stretch[i] + shift[i, 0]
         while q >= bar:
             bits[p] = 1
             q -= bar
             threshold[p] = 1.0 + pixels.kappa[p] * _gauss(random)
-            bar = threshold[p] * stretch[i] + shift[i]
+            bar = threshold[p] * stretch[i] + shift[i, 0]
         charge[p] = q
 
 
@@ -353,7 +381,7 @@ def cross(near, n, come, window, pixels, laws, work, columns, random, bits):
             if crosses:
                 _reset(i, p, n, at, come, window, pixels, laws, work, random, bits)
             else:
-                _leave_piece(i, work)
+                _move_on(i, p, pixels, window, work, random)
         _close(i, p, pixels, work)
 
 
@@ -378,7 +406,7 @@ def cross_together(near, n, come, window, pixels, laws, work, to_rows, to_column
         if crosses:
             _reset(i, p, n, at, come, window, pixels, laws, work, random, bits)
         else:
-            _leave_piece(i, work)
+            _move_on(i, p, pixels, window, work, random)
         at, _ = _next(i, p, come, window, pixels, laws, work, random, bits)
         if at == NEVER:
             waiting -= 1
@@ -472,7 +500,8 @@ def _close(i, p, pixels, work):
 def _bar(i, p, side, come, window, pixels, work):
     """The threshold at one end of the pixel's piece."""
     r, s = work.row[i], work.piece[i]
-    level = pixels.threshold[p] * come.stretch[i] * window.stretch[r, s, side] + come.shift[i]
+    shift = come.shift[i, s + side if come.shift.shape[1] > 1 else 0]
+    level = pixels.threshold[p] * come.stretch[i] * window.stretch[r, s, side] + shift
     return level + pixels.per_mv[p] * window.millivolt[r, s, side]
 
 
@@ -481,8 +510,11 @@ def _mean(i, p, come, window, work):
     """Mean charge that comes in the pixel's piece."""
     r, s = work.row[i], work.piece[i]
     a, b = window.u[r, s], window.u[r, s + 1]
-    light = window.light[r, s] + come.tilt[p] * ((b * b - b) - (a * a - a))
-    return max(come.light[p] * light + come.dark[p] * (b - a), 0.0)
+    if come.within.shape[0] > 0:
+        light = come.within[p, s]
+    else:
+        light = come.light[p] * (window.light[r, s] + come.tilt[p] * ((b * b - b) - (a * a - a)))
+    return max(light + come.dark[p] * (b - a), 0.0)
 
 
 @njit(inline="always", **PLAIN)
@@ -516,7 +548,7 @@ def _leap(i, p, come, window, pixels, laws, work, random):
             break
         mean += here
         work.piece[i] += 1
-    work.charge[i] += _collected(mean, pixels.quiet[p], random)
+    work.charge[i] += _collected(mean, pixels.quiet[p] * work.kept[i], random)
 
 
 @njit(inline="always", **PLAIN)
@@ -528,38 +560,64 @@ def _decay_ramp(i, p, window, pixels, laws, work):
 
 @njit(inline="always", **PLAIN)
 def _enter_piece(i, p, come, window, pixels, laws, work, random):
-    """Draw the charge between the piece's beginning, or the moment that the node is let go, and its end."""
+    """Begin at the piece's beginning, or the moment that the node is let go."""
     r, s = work.row[i], work.piece[i]
     a, b = window.u[r, s], window.u[r, s + 1]
-    work.begin[i], work.end[i], work.entered[i] = max(a, work.open[i]), b, True
-    mean = _mean(i, p, come, window, work) * work.kept[i] * (b - work.begin[i]) / (b - a)
+    work.begin[i], work.entered[i] = max(a, work.open[i]), True
+    work.rate[i] = _mean(i, p, come, window, work) / max(b - a, 1e-12)
     if laws.ramp_loss > 0.0:
-        mean *= 1.0 - pixels.ramp[p] * laws.ramp_tau / (b - a) * (1.0 - np.exp(-(b - a) / laws.ramp_tau))
+        work.rate[i] *= 1.0 - pixels.ramp[p] * laws.ramp_tau / (b - a) * (1.0 - np.exp(-(b - a) / laws.ramp_tau))
         _decay_ramp(i, p, window, pixels, laws, work)
-    work.rest[i] = _collected(mean, pixels.quiet[p], random)
+    _await(i, p, pixels, window, work, random)
 
 
 @njit(inline="always", **PLAIN)
-def _leave_piece(i, work):
-    work.charge[i] += work.rest[i]
-    work.rest[i], work.entered[i] = 0.0, False
-    work.piece[i] += 1
+def _await(i, p, pixels, window, work, random):
+    """Draw the charge from `begin` to the end of the piece; where electrons are few, the moment of the next one."""
+    begin, end, rate = work.begin[i], window.u[work.row[i], work.piece[i] + 1], work.rate[i]
+    quantum = pixels.quiet[p] * work.kept[i]
+    work.end[i], work.rest[i], work.due[i] = end, 0.0, 0.0
+    if pixels.quiet[p] < FEW:
+        work.rest[i] = _collected(rate * work.kept[i] * (end - begin), quantum, random)
+    elif rate > 0.0:
+        comes = begin - np.log(_uniform(random)) * pixels.quiet[p] / rate
+        if comes < end:
+            work.end[i], work.due[i] = comes, quantum
+
+
+@njit(inline="always", **PLAIN)
+def _move_on(i, p, pixels, window, work, random):
+    """Pass `end`, without a crossing."""
+    work.charge[i] += work.rest[i] + work.due[i]
+    work.rest[i] = 0.0
+    if work.end[i] < window.u[work.row[i], work.piece[i] + 1]:
+        work.begin[i] = work.end[i]
+        _await(i, p, pixels, window, work, random)
+    else:
+        work.entered[i] = False
+        work.piece[i] += 1
+
+
+@njit(inline="always", **PLAIN)
+def _level(i, p, at, come, window, pixels, work):
+    """The threshold at a moment of the pixel's piece."""
+    a, b = window.u[work.row[i], work.piece[i]], window.u[work.row[i], work.piece[i] + 1]
+    first, last = _bar(i, p, 0, come, window, pixels, work), _bar(i, p, 1, come, window, pixels, work)
+    return first + (last - first) * ((at - a) / (b - a))
 
 
 @njit(inline="always", **PLAIN)
 def _meets(i, p, come, window, pixels, work):
-    """When charge meets the threshold in the pixel's piece, and whether it does (else the piece's end)."""
-    r, s = work.row[i], work.piece[i]
-    a, begin, end = window.u[r, s], work.begin[i], work.end[i]
-    first, last = _bar(i, p, 0, come, window, pixels, work), _bar(i, p, 1, come, window, pixels, work)
+    """When charge meets the threshold before `end`, and whether it does (else `end`)."""
+    begin, end = work.begin[i], work.end[i]
     if begin >= end:
         return end, False
-    now = first + (last - first) * (begin - a) / (end - a) - work.charge[i]
+    now = _level(i, p, begin, come, window, pixels, work) - work.charge[i]
     if now <= 0.0:
         return begin, True
-    then = last - work.charge[i] - work.rest[i]
+    then = _level(i, p, end, come, window, pixels, work) - work.charge[i] - work.rest[i]
     if then > 0.0:
-        return end, False
+        return end, then <= work.due[i]
     return begin + (end - begin) * now / (now - then), True
 
 
@@ -569,10 +627,15 @@ def _reset(i, p, n, at, come, window, pixels, laws, work, random, bits):
     begin, end = work.begin[i], work.end[i]
     after = end - at
     over = max(work.rest[i], 0.0) * after / (end - begin)
+    taken_over = work.due[i] > 0.0 and at == end
+    excess = 0.0
+    if taken_over or at == 0.0:
+        due = work.due[i] if taken_over else 0.0
+        excess = max(work.charge[i] + due - _level(i, p, at, come, window, pixels, work), 0.0)
     r, s = work.row[i], work.piece[i]
     rate = _mean(i, p, come, window, work) / (window.u[r, s + 1] - window.u[r, s])
     delay = laws.delay * max(rate, 1e-9) ** -laws.delay_power if laws.delay > 0.0 else 0.0
-    if at + delay < 1.0:
+    if at + delay * laws.delay_reports < 1.0:
         bits[p] = 1
     else:
         pixels.late[p] = 1
@@ -594,7 +657,12 @@ def _reset(i, p, n, at, come, window, pixels, laws, work, random, bits):
     pixels.last[p] = n + at
     if laws.ramp_loss > 0.0:
         pixels.ramp[p] = laws.ramp_loss * np.exp(-after / laws.ramp_tau)
-    work.charge[i], work.rest[i], work.begin[i] = left, over, min(at + held, end)
+    work.charge[i], work.rest[i], work.begin[i] = left + excess, over, min(at + held, end)
+    if pixels.quiet[p] >= FEW:
+        last = window.u[r, s + 1]
+        work.begin[i], work.end[i], work.due[i] = min(at + held, last), last, 0.0
+        if work.begin[i] < last:
+            _await(i, p, pixels, window, work, random)
     pixels.threshold[p] = 1.0 + pixels.kappa[p] * _gauss(random)
     if laws.outlier_share > 0.0 and _uniform(random) < laws.outlier_share:
         pixels.threshold[p] += laws.outlier_kappa * _gauss(random)

@@ -55,10 +55,7 @@ EQUIVALENT = (
 )
 """At one V_d the data hold only the sum of the first (the slope of A_k), only the product of the others (the rate)."""
 
-INSEPARABLE = (
-    *EQUIVALENT,
-    {"photo_response_nonlinearity", "ir_drop", "dead_time", "synchronous_reset"},
-)
+INSEPARABLE = (*EQUIVALENT, {"photo_response_nonlinearity", "ir_drop", "dead_time", "synchronous_reset"})
 """Sets whose `class` counts as right (DESIGN section 9).  x / (1 + tau x) and x (1 - tau x) differ by (tau x)^2: at the
 strengths drawn, some 0.002 frames, by parts in a million, which no recording of this length holds.  Of charge between
 crossing and read-out, half a frame's in the mean, a share f is a dead time of f / 2 frames that scatters by 0.3 f."""

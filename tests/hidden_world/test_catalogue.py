@@ -200,6 +200,14 @@ def test_reports_without_spikes_and_spikes_without_reports():
     near(np.mean(gaps > 15), 0.02, 3e-3)
 
 
+@pytest.mark.parametrize(("name", "bit", "share"), [("missed_spikes", 1, 0.7), ("spurious_spikes", 0, 0.3)])
+def test_a_report_is_wrong_as_often_as_stated(name, bit, share):
+    """At a third of all, where a place is drawn twice now and then."""
+    bits = np.full((400, 32, 32), bit, np.uint8)
+    wrong = CATALOGUE[name].bits(bits, {"probability": 0.3}, np.random.default_rng(1))
+    near(wrong.mean(), share, 5 * np.sqrt(0.21 / wrong.size))
+
+
 def test_excess_threshold_noise_adds_in_quadrature():
     camera = plain_camera((40, 40), electrons=1e9, kappa=0.004, spread=0.2)
     bits = filmed(camera, 1 / 8.4, 6000, [hidden("excess_threshold_noise", sigma_mV=6.0)])

@@ -16,12 +16,9 @@ import subprocess
 import time
 import traceback
 from collections import Counter
-from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import ProcessPoolExecutor, as_completed
-from contextlib import AbstractContextManager, nullcontext
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import asdict
-from functools import lru_cache
-from multiprocessing import get_context
+from functools import lru_cache, partial
 from pathlib import Path
 from typing import Any
 
@@ -64,14 +61,13 @@ def run_trial(
     diagnose: str,
     *,
     picked: Sequence[Case],
-    jobs: int = 1,
     threads: int = 1,
     keep: bool = False,
-    starting: Callable[[], AbstractContextManager[object]] = nullcontext,
+    spread: Callable[[Callable[[Case], None], Sequence[Case]], Iterable[None]] = map,
 ) -> Iterator[tuple[int, int]]:
     """Do the missing cases; yields (done, all) as it goes on.  diagnose: `module:function`, see `Diagnose`.
 
-    jobs: cases at once.  threads: of each diagnosis.  starting: a context in which their processes are started.
+    threads: of each diagnosis.  spread: does cases, one at a time or several.
 
     Keys are sealed and their hashes published before the first diagnosis.  Cases go in the order of their ids, which is
     that of no group: the cases of a trial that is cut short are a fair sample.
@@ -81,22 +77,9 @@ def run_trial(
     waiting = sorted((case for case in picked if not is_done(out, case.id)), key=lambda case: case.id)
     done = len(picked) - len(waiting)
     yield done, len(picked)
-    if jobs == 1:
-        for case in waiting:
-            run_case(case, out, diagnose, threads, keep)
-            done += 1
-            yield done, len(picked)
-        return
-    with ProcessPoolExecutor(jobs, mp_context=get_context("spawn")) as pool:
-        with starting():
-            futures = [pool.submit(run_case, case, out, diagnose, threads, keep) for case in waiting]
-        try:
-            for future in as_completed(futures):
-                future.result()
-                done += 1
-                yield done, len(picked)
-        finally:
-            pool.shutdown(cancel_futures=True)  # a trial that is stopped ends with the cases at work
+    for _ in spread(partial(run_case, out=out, diagnose=diagnose, threads=threads, keep=keep), waiting):
+        done += 1
+        yield done, len(picked)
 
 
 def is_done(out: Path, case_id: str) -> bool:

@@ -39,11 +39,7 @@ class Base:
     bias_sd_v: float = 0.0497
 
 
-BASES = {
-    "scsim": Base(5e4, 6.36),
-    "physical": Base(None, None),
-    "ideal": Base(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0),
-}
+BASES = {"scsim": Base(5e4, 6.36), "physical": Base(None, None), "ideal": Base(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)}
 
 PATTERNS: dict[str, Callable[[np.random.Generator, tuple[int, ...]], Array]] = {
     "normal": lambda rng, shape: rng.standard_normal(shape),

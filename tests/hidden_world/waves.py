@@ -47,35 +47,21 @@ class Sine:
 
 
 @dataclass(frozen=True)
-class Square:
-    """1 + amplitude in the first half of each period, 1 - amplitude in the second."""
-
-    amplitude: float
-    cycles: float
-    phase: float
-
-    def value(self, t: Array) -> Array:
-        return 1.0 + self.amplitude * np.where((self.cycles * t + self.phase) % 1.0 < 0.5, 1.0, -1.0)
-
-    def area(self, t: Array) -> Array:
-        into = (self.cycles * t + self.phase) % 1.0
-        return t + self.amplitude / self.cycles * np.minimum(into, 1.0 - into)
-
-
-@dataclass(frozen=True)
-class Pulses:
-    """1, and 0 for the first `shut` frames of every period; phase: frames into a period at time 0."""
+class Switched:
+    """`first` for the first `frames` of every period, `then` after; phase: frames into a period at time 0."""
 
     period: float
-    shut: float
+    frames: float
     phase: float
+    first: float
+    then: float
 
     def value(self, t: Array) -> Array:
-        return ((t + self.phase) % self.period >= self.shut).astype(np.float64)
+        return np.where((t + self.phase) % self.period < self.frames, self.first, self.then)
 
     def area(self, t: Array) -> Array:
         whole, into = np.divmod(t + self.phase, self.period)
-        return t - whole * self.shut - np.minimum(into, self.shut)
+        return self.then * t + (self.first - self.then) * (whole * self.frames + np.minimum(into, self.frames))
 
 
 @dataclass(frozen=True)
@@ -168,8 +154,9 @@ class SlewingClock(Clock):
 
 
 def means(waves: Sequence[Wave], t: Array) -> Array:
-    """Product of the waves' means between successive times of the last axis; exact for one wave."""
+    """Product of the waves' means between successive times of the last axis (0 between equal ones); exact for one."""
+    span = np.diff(t, axis=-1)
     product = np.ones((*t.shape[:-1], t.shape[-1] - 1))
     for wave in waves:
-        product *= np.diff(wave.area(t), axis=-1) / np.diff(t, axis=-1)
+        product *= np.diff(wave.area(t), axis=-1) / np.where(span > 0.0, span, 1.0)
     return product

@@ -7,7 +7,7 @@ a mechanism that starts on the way is switched on between two frames, the charge
 from __future__ import annotations
 
 import zlib
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -74,34 +74,40 @@ def _labelled(made: Iterator[tuple[Shot, Bits]]) -> Iterator[Recorded]:
         yield Recorded(shot.name, shot.use, bits, shot.light)
 
 
-def film(recipe: Recipe, camera: Camera, shot: Shot) -> Bits:
-    """(T, rows, columns) bits of one recording."""
+def film(
+    recipe: Recipe, camera: Camera, shot: Shot, change: Callable[[Physics], object] = lambda physics: None
+) -> Bits:
+    """(T, rows, columns) bits of one recording; change: of its physics, after all mechanisms."""
     everywhere = [h for h in recipe.hidden if h.rows is None and h.columns is None]
-    bits = _film(recipe, camera, shot, everywhere)
+    bits = _film(recipe, camera, shot, everywhere, change)
     if len(everywhere) < len(recipe.hidden):
-        there = _film(recipe, camera, shot, recipe.hidden)
+        there = _film(recipe, camera, shot, recipe.hidden, change)
         for hidden in recipe.hidden:
             where = (slice(None), slice(*(hidden.rows or (None,))), slice(*(hidden.columns or (None,))))
             bits[where] = there[where]
     return bits
 
 
-def _film(recipe: Recipe, camera: Camera, shot: Shot, hidden: Sequence[Hidden]) -> Bits:
+def _film(
+    recipe: Recipe, camera: Camera, shot: Shot, hidden: Sequence[Hidden], change: Callable[[Physics], object]
+) -> Bits:
     """One recording with these mechanisms all over the array."""
     rng = stream(recipe.seed, "temporal", shot.name)
     begins = sorted({0, *(round(h.since * recipe.frames) for h in hidden)})
     parts, under_way = [], None
     for first, stop in zip(begins, [*begins[1:], recipe.frames], strict=True):
         acting = [h for h in hidden if round(h.since * recipe.frames) <= first]
-        recording = Recording(physics_of(recipe, camera, shot, acting), rng)
+        physics = physics_of(recipe, camera, shot, acting)
+        change(physics)
+        recording = Recording(physics, rng)
         under_way = recording if under_way is None else recording.resume(under_way)
         parts.append(under_way.frames(first, stop))
     bits = (parts[0] if len(parts) == 1 else np.concatenate(parts)).reshape(recipe.frames, *recipe.shape)
     for h in hidden:
-        change = law_of(h).bits
-        if change is not None:
+        report = law_of(h).bits
+        if report is not None:
             first = round(h.since * recipe.frames)
-            bits[first:] = change(bits[first:], h.parameters, stream(recipe.seed, h.name, "bits", shot.name))
+            bits[first:] = report(bits[first:], h.parameters, stream(recipe.seed, h.name, "bits", shot.name))
     return bits
 
 

@@ -26,9 +26,9 @@ def frames_of(us: float) -> float:
 
 def event_arrays(events: list[tuple[float, int, float]]) -> tuple[Array, Whole, Array]:
     """Time, pixel and size of events, in the order of time."""
-    ordered = sorted(events, key=lambda event: event[0])
-    time, pixel, size = zip(*ordered, strict=True) if ordered else ((), (), ())
-    return np.array(time, np.float64), np.array(pixel, np.int64), np.array(size, np.float64)
+    time, pixel, size = np.array(events, np.float64).reshape(-1, 3).T
+    order = np.argsort(time, kind="stable")
+    return time[order], pixel[order].astype(np.int64), size[order]
 
 
 def some_pixels(camera: Camera, fraction: float, rng: Rng) -> Whole:

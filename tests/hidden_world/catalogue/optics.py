@@ -13,7 +13,7 @@ from tests.hidden_world.integrator import Physics
 from tests.hidden_world.light import Light
 from tests.hidden_world.mechanism import Law, Mechanism, OnCamera, Parameters, Rng
 from tests.hidden_world.unit import FRAME_S, Camera
-from tests.hidden_world.waves import Polygon, Sine, Square
+from tests.hidden_world.waves import Polygon, Sine, Switched
 
 HOPS_PER_S = 40.0
 """Jumps of an arc lamp: eight in a recording of 8000 frames."""
@@ -21,9 +21,10 @@ HALO_PIXELS = 2.0
 
 
 def _lamp_walks(ph: Physics, camera: Camera, frames: int, p: Parameters, rng: Rng) -> None:
-    """Known at whole frames, straight between them."""
-    walk = np.cumsum(rng.standard_normal(frames + 1)) * p["sigma_per_root_s"] * np.sqrt(FRAME_S)
-    ph.light_waves += (Polygon(np.arange(frames + 1.0), np.maximum(1.0 + walk, 0.0)),)
+    """Known at whole frames, or at `steps` moments of each, straight between them."""
+    steps = int(p.get("steps", 1))
+    walk = np.cumsum(rng.standard_normal(frames * steps + 1)) * p["sigma_per_root_s"] * np.sqrt(FRAME_S / steps)
+    ph.light_waves += (Polygon(np.arange(walk.size) / steps, np.maximum(1.0 + walk, 0.0)),)
 
 
 def _lamp_warms(ph: Physics, camera: Camera, frames: int, p: Parameters, rng: Rng) -> None:
@@ -41,11 +42,13 @@ def _lamp_hops(ph: Physics, camera: Camera, frames: int, p: Parameters, rng: Rng
 
 
 def _sine(ph: Physics, camera: Camera, frames: int, p: Parameters, rng: Rng) -> None:
-    ph.light_waves += (Sine(p["modulation"], p["frequency_hz"] * FRAME_S, rng.random()),)
+    phase = p.get("phase_cycles", rng.random())
+    ph.light_waves += (Sine(p["modulation"], p["frequency_hz"] * FRAME_S, phase),)
 
 
 def _switched(ph: Physics, camera: Camera, frames: int, p: Parameters, rng: Rng) -> None:
-    ph.light_waves += (Square(p["modulation"], p["frequency_hz"] * FRAME_S, rng.random()),)
+    period, m = 1.0 / (p["frequency_hz"] * FRAME_S), p["modulation"]
+    ph.light_waves += (Switched(period, 0.5 * period, period * rng.random(), 1.0 + m, 1.0 - m),)
 
 
 def _two_lamps(ph: Physics, camera: Camera, frames: int, p: Parameters, rng: Rng) -> None:
@@ -65,6 +68,19 @@ def _diffused(radiance: NDArray[np.float32], variance: float, axes: tuple[int, .
         for axis in axes:
             radiance = convolve1d(radiance, np.array([share, 1.0 - 2.0 * share, share]), axis=axis, mode="nearest")
     return radiance
+
+
+def normal_law(picture: NDArray[np.float64], sigma: float) -> NDArray[np.float64]:
+    """Light spread along rows and columns by exp(-n^2 / 2 v) over n pixels, v such that the variance is sigma^2."""
+    n = np.arange(-60, 61)
+    low, high = 1e-3, sigma**2 + 1.0
+    for _ in range(60):
+        weights = np.exp(-(n**2) / (low + high))
+        weights /= weights.sum()
+        low, high = (0.5 * (low + high), high) if weights @ n**2 < sigma**2 else (low, 0.5 * (low + high))
+    for axis in (0, 1):
+        picture = convolve1d(picture, weights, axis=axis, mode="nearest")
+    return picture
 
 
 def _round(light: Light, shape: tuple[int, int], p: Parameters) -> Light:

@@ -100,7 +100,7 @@ def _misses_words(bits: Bits, p: Parameters, rng: Rng) -> Bits:
 
 
 def _adds(bits: Bits, p: Parameters, rng: Rng) -> Bits:
-    at = rng.integers(0, bits.size, rng.poisson(p["probability"] * bits.size))
+    at = rng.integers(0, bits.size, rng.poisson(_draws(p["probability"], bits.size)))
     bits.reshape(-1)[at] = 1
     return bits
 
@@ -147,8 +147,13 @@ def chosen(bits: Bits, probability: float, rng: Rng) -> Whole:
     """Flat indices of spikes, each picked with that probability."""
     flat = bits.reshape(-1)
     total = int(np.count_nonzero(flat))
-    which = np.unique(rng.integers(0, total, rng.poisson(probability * total))) if total else np.zeros(0, np.int64)
-    return _places(flat, which)
+    draws = rng.poisson(_draws(probability, total))
+    return _places(flat, np.unique(rng.integers(0, total, draws)) if total else np.zeros(0, np.int64))
+
+
+def _draws(probability: float, count: int) -> float:
+    """Mean number of draws, each of one of `count` places, from which a place is drawn at all with this probability."""
+    return -np.log1p(-min(probability, 1.0 - 1e-9)) * count
 
 
 @njit(cache=True)

@@ -63,7 +63,7 @@ def _ripples(*harmonics: tuple[float, float]) -> OnPhysics:
     """(share, multiple of the frequency) of each sine on all thresholds, in one phase."""
 
     def ripple(ph: Physics, camera: Camera, frames: int, p: Parameters, rng: Rng) -> None:
-        cycles, phase = p["frequency_hz"] * FRAME_S, rng.random()
+        cycles, phase = p["frequency_hz"] * FRAME_S, p.get("phase_cycles", rng.random())
         for share, times in harmonics:
             ph.threshold_waves += (Sine(share * p["ripple"], times * cycles, times * phase),)
 
@@ -71,7 +71,8 @@ def _ripples(*harmonics: tuple[float, float]) -> OnPhysics:
 
 
 def _ripple_of_reset(ph: Physics, camera: Camera, frames: int, p: Parameters, rng: Rng) -> None:
-    ph.reset_ripple = (p["ripple"], p["frequency_hz"] * FRAME_S, rng.random())
+    cycles = p["frequency_hz"] * FRAME_S
+    ph.laws = ph.laws._replace(ripple=p["ripple"], ripple_cycles=cycles, ripple_phase=rng.random())
     ph.substeps = max(ph.substeps, RESET_SUBSTEPS)
 
 

@@ -12,8 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from benchmarks.literal.camera import Camera
-from benchmarks.literal.statistics import (
+from benchmarks.settings.statistics import (
     A1,
     A4,
     COINCIDENCE,
@@ -37,9 +36,11 @@ from benchmarks.literal.statistics import (
     wander,
     windows,
 )
+from benchmarks.settings.world import filmed
 from spikecam_env.sensor import Keyframes, SensorModel, SpikeSensor
 from spikecam_env.sensor.effects import CATALOGUE
 from spikecam_env.types import Floats, Spikes
+from tests.hidden_world.light import Light
 
 JUMP = 1e-6
 """Time that a jump of light takes [frames]."""
@@ -87,38 +88,32 @@ class Case:
         rows, columns = self.shape
         return (self.groups, self.shape) if self.separate else (1, (rows, columns * self.groups))
 
-    def literal(self, seed: int) -> list[Spikes]:
-        """Spikes (F, H, W) of every group, electron by electron."""
+    def world(self, seed: int) -> list[Spikes]:
+        """Spikes (F, H, W) of every group in the hidden world."""
         cameras, shape = self.cameras
         keys, levels = self.film(self.frames)
+        light = Light(keys, levels[:, None, None].astype(np.float32))
+        seeds = np.random.SeedSequence([seed, 1]).generate_state(cameras)
         picture = self._picture(shape)
-        streams = np.random.SeedSequence([seed, 1]).spawn(cameras)
-        return self._grouped(
-            [
-                Camera(
-                    self.model, self.frames, shape, keys, levels, picture, np.random.Generator(np.random.PCG64(s))
-                ).exposed()
-                for s in streams
-            ]
-        )
+        return self._grouped([filmed(self.effects, self.electrons, picture, light, self.frames, int(s)) for s in seeds])
 
     def check(self) -> None:
         """Raise InputError where the sensor refuses this setting."""
-        keys, levels = self.film(self.frames)
-        radiance = (levels[:, None, None] * self._picture(self.shape)).astype(np.float32)
-        light = Keyframes(keys, np.ascontiguousarray(radiance))
-        SpikeSensor(self.model, self.shape, engine="fast", threads=1).step(light, self.frames)
+        sensor = SpikeSensor(self.model, self.shape, engine="fast", threads=1)
+        sensor.step(self._keyframes(self.shape), self.frames)
 
     def engine(self, name: str, seed: int) -> list[Spikes]:
         """The same by one of the sensor's engines."""
         cameras, shape = self.cameras
-        keys, levels = self.film(self.frames)
-        radiance = (levels[:, None, None] * self._picture(shape)).astype(np.float32)
-        light = Keyframes(keys, np.ascontiguousarray(radiance))
+        light = self._keyframes(shape)
         seeds = np.random.SeedSequence([seed, 2 if name == "fast" else 3]).generate_state(cameras)
         return self._grouped(
             [SpikeSensor(self.model, shape, int(s), engine=name, threads=1).step(light, self.frames) for s in seeds]
         )
+
+    def _keyframes(self, shape: tuple[int, int]) -> Keyframes:
+        keys, levels = self.film(self.frames)
+        return Keyframes(keys, (levels[:, None, None] * self._picture(shape)).astype(np.float32))
 
     def _picture(self, shape: tuple[int, int]) -> Floats:
         picture = np.broadcast_to(self.picture, self.shape)
@@ -202,14 +197,10 @@ def _optics() -> list[Case]:
 
     drift = {"lamp_drift": {"sigma_per_root_s": 10.0}}
     beside = (*places((4, 4), (4, 5), (3, 4), (3, 5), (4, 6), (0, 0)), RATE)
-    spotted: dict[str, Any] = {
-        "picture": spot(8, 8, 0.2, 1.0),
-        "electrons": 500.0,
-        "shape": (8, 8),
-        "groups": 40,
-        "frames": 150,
-    }
-    blurred: dict[str, Any] = {**spotted, "separate": True}
+    shaded = {"vignetting": {"falloff": 0.4, "centre_x": 0.3}}
+    array: dict[str, Any] = {"electrons": 500.0, "frames": 150, "separate": True}
+    large: dict[str, Any] = {"shape": (16, 16), "separate": True}
+    blurred: dict[str, Any] = {**array, "picture": spot(8, 8, 0.2, 1.0), "groups": 40}
     return [
         Case("100 Hz, m .3", steady(0.3), flicker(0.3, 100.0), (*STEADY, *line(0.0025)), frames=800, groups=32),
         Case("40 kHz, m .5, phase 0", steady(0.3), flicker(0.5, 40e3), STEADY, quick=True),
@@ -219,20 +210,10 @@ def _optics() -> list[Case]:
         Case("57 kHz, m 1, light .8", steady(0.8), flicker(1.0, 57e3, 0.1), (*STEADY, *line(1.425)), groups=32),
         Case("17 kHz in cosine light", COSINE, flicker(0.5, 17e3), (*STEADY, *line(0.425))),
         Case("40 kHz in a strobe", strobe(0.3, 0.2, 0.1), flicker(0.5, 40e3), STEADY, frames=150),
-        Case(
-            "10 / sqrt(s)", steady(0.3), drift, (RATE, *wander(1, 2, 8, 32)), shape=(16, 16), frames=64, separate=True
-        ),
+        Case("10 / sqrt(s)", steady(0.3), drift, (RATE, *wander(1, 2, 8, 32)), **{**large, "frames": 64}),
         Case("sigma .5", steady(1.0), {"optical_blur": {"sigma_pixels": 0.5}}, beside, **blurred),
         Case("sigma 1.5", steady(1.0), {"optical_blur": {"sigma_pixels": 1.5}}, beside, **blurred),
-        Case(
-            "falloff .4",
-            steady(0.5),
-            {"vignetting": {"falloff": 0.4, "centre_x": 0.3}},
-            (*places((0, 0), (7, 7), (4, 2)), RATE, SPREAD),
-            electrons=500.0,
-            separate=True,
-            frames=150,
-        ),
+        Case("falloff .4", steady(0.5), shaded, (*places((0, 0), (7, 7), (4, 2)), RATE, SPREAD), **array),
     ]
 
 
@@ -245,10 +226,7 @@ def _photodiode() -> list[Case]:
         return {"random_telegraph_noise": telegraph, "dark_current": {"mean_pA": 19.0}}
 
     def warming(rise: float, frames: float) -> dict[str, dict[str, Any]]:
-        return {
-            "dark_current_drift": {"rise": rise, "tau_ms": 0.025 * frames},
-            "dark_current": {"mean_pA": 38.0},
-        }
+        return {"dark_current_drift": {"rise": rise, "tau_ms": 0.025 * frames}, "dark_current": {"mean_pA": 38.0}}
 
     def bent(beta: float) -> dict[str, dict[str, Any]]:
         return {"photo_response_nonlinearity": {"beta": beta}}
@@ -256,6 +234,7 @@ def _photodiode() -> list[Case]:
     dark, step = steady(0.0), (RATE, *after(5, 40))
     edges = square(0.1, 0.7, 40, 5.6)
     in_the_dark = {"dark_current": {"mean_pA": 38.0}}
+    hot, bias = {"hot_pixels": {"fraction": 0.05, "mean_pA": 40.0}}, {"bias_voltage_spread": {"sigma_V": 0.05}}
     patterns: dict[str, Any] = {"electrons": 200.0, "frames": 100, "shape": (16, 16), "groups": 32}
     bloom = {"blooming": {"share": 0.4, "full": 1.0}}
     beside = (*places((4, 4), (4, 5), (3, 4), (3, 5)), RATE)
@@ -283,23 +262,11 @@ def _photodiode() -> list[Case]:
         Case("38 pA", dark, in_the_dark, STEADY),
         Case("38 +- 8 pA", dark, {"dark_current_spread": {"sigma_pA": 8.0}} | in_the_dark, PATTERN, **patterns),
         Case("38 pA, log .45", dark, {"dark_current_tail": {"sigma": 0.45}} | in_the_dark, PATTERN, **patterns),
-        Case(
-            "5 % hot, 40 pA",
-            dark,
-            {"hot_pixels": {"fraction": 0.05, "mean_pA": 40.0}} | in_the_dark,
-            PATTERN,
-            **patterns,
-        ),
+        Case("5 % hot, 40 pA", dark, hot | in_the_dark, PATTERN, **patterns),
         Case("gain 5 %", steady(0.3), {"conversion_gain_spread": {"sigma": 0.05}}, PATTERN, **patterns),
         Case("capacitance .3 fF", steady(0.3), {"capacitor_spread": {"sigma_fF": 0.3}}, PATTERN, **patterns),
-        Case("bias 50 mV", steady(0.3), {"bias_voltage_spread": {"sigma_V": 0.05}}, PATTERN, **patterns),
-        Case(
-            "bias 50 mV, in the dark",
-            dark,
-            {"bias_voltage_spread": {"sigma_V": 0.05}} | in_the_dark,
-            PATTERN,
-            **patterns,
-        ),
+        Case("bias 50 mV", steady(0.3), bias, PATTERN, **patterns),
+        Case("bias 50 mV, in the dark", dark, bias | in_the_dark, PATTERN, **patterns),
     ]
 
 
@@ -314,9 +281,11 @@ def _threshold() -> list[Case]:
         return {"clock_feedthrough": {"amplitude_mV": height_mV, "phase_frames": 0.6, "tau_us": 25.0 * tau}}
 
     fine: dict[str, Any] = {"electrons": 1000.0, "groups": 32, "shape": (4, 8), "frames": 250}
+    of_all = (*STEADY, *POPULATION)
+    dim: dict[str, Any] = {"electrons": 1000.0, "frames": 400, "groups": 32}
     common: dict[str, Any] = {"electrons": 300.0, "groups": 40, "shape": (8, 8), "frames": 200, "separate": True}
     dark = {"dark_current": {"mean_pA": 57.0}}
-    skew = {"readout_skew": {"span": -1.1}}
+    skew, by_rows = {"readout_skew": {"span": -1.1}}, (*STEADY, ROWS, *bands(4))
     banded: dict[str, Any] = {"electrons": 1000.0, "groups": 32, "shape": (16, 2), "frames": 250}
     rows: dict[str, Any] = {"electrons": 500.0, "shape": (16, 8), "groups": 48, "frames": 100, "separate": True}
     flicker = {"threshold_flicker_noise": {"sigma_mV": 20.0, "octaves": 4}}
@@ -333,37 +302,23 @@ def _threshold() -> list[Case]:
         Case("2 % at 17 kHz, cosine light", COSINE, ripple(0.02, 17e3), (*STEADY, *line(0.425)), **fine),
         Case("2 % at 17 kHz, strobe", strobe(0.3, 0.2), ripple(0.02, 17e3), (*STEADY, *line(0.425)), **fine),
         Case(".4 % at 17 kHz, strobe", strobe(0.3, 0.2), ripple(0.004, 17e3), (*STEADY, *line(0.425)), **fine),
-        Case(
-            "5 % at 40 kHz, light 1.3", steady(1.3), ripple(0.05, 40e3), (RATE, HISTOGRAM), electrons=100.0, frames=100
-        ),
+        Case("5 % at 40 kHz, light 1.3", steady(1.3), ripple(0.05, 40e3), (RATE, HISTOGRAM), frames=100),
         Case("-20 mV, tau .25", steady(0.333), edge(-20.0, 0.25), (*STEADY, ROWS), **banded),
-        Case(
-            "-20 mV, tau .25, skew -1.1", steady(0.35), edge(-20.0, 0.25) | skew, (*STEADY, ROWS, *bands(4)), **banded
-        ),
-        Case("-50 mV, tau .25, skew -1.1", steady(0.5), edge(-50.0, 0.25) | skew, (*STEADY, ROWS, *bands(4)), **banded),
-        Case("50 mV, tau .1, skew -1.1", steady(0.35), edge(50.0, 0.1) | skew, (*STEADY, ROWS, *bands(4)), **banded),
+        Case("-20 mV, tau .25, skew -1.1", steady(0.35), edge(-20.0, 0.25) | skew, by_rows, **banded),
+        Case("-50 mV, tau .25, skew -1.1", steady(0.5), edge(-50.0, 0.25) | skew, by_rows, **banded),
+        Case("50 mV, tau .1, skew -1.1", steady(0.35), edge(50.0, 0.1) | skew, by_rows, **banded),
         Case("-50 mV, cosine light", COSINE, edge(-50.0, 0.25), (*STEADY, ROWS), **banded),
         Case("-21 mV, cosine light", COSINE, edge(-21.0, 0.25), (*STEADY, ROWS), **banded),
         Case("50 mV, N 500", steady(0.3), mV("reset_noise", 50.0), STEADY, electrons=500.0, groups=32),
         Case("50 mV, N 500", steady(0.3), mV("excess_threshold_noise", 50.0), STEADY, electrons=500.0, groups=32),
-        Case("20 mV", steady(0.3), mV("common_threshold_noise", 20.0), (*STEADY, *POPULATION), **common),
-        Case(
-            "20 mV", steady(0.3), mV("row_temporal_noise", 20.0), (*STEADY, *POPULATION), **{**common, "shape": (1, 64)}
-        ),
-        Case(
-            "6.36 mV, light .05",
-            steady(0.05),
-            mV("frame_threshold_noise", 6.36),
-            STEADY,
-            electrons=1000.0,
-            frames=400,
-            groups=32,
-        ),
+        Case("20 mV", steady(0.3), mV("common_threshold_noise", 20.0), of_all, **common),
+        Case("20 mV", steady(0.3), mV("row_temporal_noise", 20.0), of_all, **common | {"shape": (1, 64)}),
+        Case("6.36 mV, light .05", steady(0.05), mV("frame_threshold_noise", 6.36), STEADY, **dim),
         Case("60 mV, light .1", steady(0.1), mV("frame_threshold_noise", 60.0), STEADY, electrons=500.0, groups=32),
         Case("60 mV, light .9", steady(0.9), mV("frame_threshold_noise", 60.0), STEADY, groups=32),
         Case("4 octaves of 20 mV", steady(0.2), flicker, STEADY, electrons=500.0, groups=32, shape=(4, 8)),
-        Case("d .1, light .3", steady(0.3), {"ir_drop": {"droop": 0.1}}, (*STEADY, *POPULATION), **common),
-        Case("d -.1, light .8", steady(0.8), {"ir_drop": {"droop": -0.1}}, (*STEADY, *POPULATION), **common),
+        Case("d .1, light .3", steady(0.3), {"ir_drop": {"droop": 0.1}}, of_all, **common),
+        Case("d -.1, light .8", steady(0.8), {"ir_drop": {"droop": -0.1}}, of_all, **common),
         Case("20 mV", steady(0.3), mV("row_fixed_pattern", 20.0), (RATE, ROWS), **rows),
         Case("20 mV", steady(0.3), mV("column_fixed_pattern", 20.0), (RATE, COLUMNS), **{**rows, "shape": (8, 16)}),
     ]
@@ -379,11 +334,14 @@ def _reset() -> list[Case]:
     def left(f: float, frames: float) -> dict[str, dict[str, Any]]:
         return {"incomplete_reset": {"fraction": f, "tau_us": 25.0 * frames}}
 
+    def lost(f: float) -> dict[str, dict[str, Any]]:
+        return {"synchronous_reset": {"fraction": f}}
+
     def kick(k: float) -> dict[str, dict[str, Any]]:
         return {"crosstalk": {"kick": k}}
 
     beside: dict[str, Any] = {"electrons": 150.0, "shape": (12, 12), "groups": 40, "frames": 200, "separate": True}
-    coupled = (*STEADY, *COINCIDENCE)
+    few, coupled = beside | {"electrons": 100.0}, (*STEADY, *COINCIDENCE)
     edges = square(0.1, 0.7, 20, 5.6)
     return [
         Case("tau .1, light .3", steady(0.3), dead(0.1), STEADY),
@@ -406,22 +364,18 @@ def _reset() -> list[Case]:
         Case("f .4, tau 3, light .9", steady(0.9), left(0.4, 3.0), STEADY, quick=True),
         Case("f .4, tau 5, edges at n + .6", edges, left(0.4, 5.0), (RATE, VARIANCE, SERIAL, *after(5, 20))),
         Case("f .055, tau 5, edges at n + .6", edges, left(0.055, 5.0), (RATE, VARIANCE, SERIAL, *after(5, 20))),
-        Case("all, light .3", steady(0.3), {"synchronous_reset": {"fraction": 1.0}}, STEADY),
-        Case(
-            "half, N 1000", steady(0.7), {"synchronous_reset": {"fraction": 0.5}}, STEADY, electrons=1000.0, groups=16
-        ),
-        Case("all, strobe", strobe(0.4, 0.2, 0.3), {"synchronous_reset": {"fraction": 1.0}}, STEADY),
+        Case("all, light .3", steady(0.3), lost(1.0), STEADY),
+        Case("half, N 1000", steady(0.7), lost(0.5), STEADY, electrons=1000.0, groups=16),
+        Case("all, strobe", strobe(0.4, 0.2, 0.3), lost(1.0), STEADY),
         Case("k .02, light .22", steady(0.22), kick(0.02), coupled, **beside, quick=True),
         Case("k -.02, light .22", steady(0.22), kick(-0.02), coupled, **beside),
         Case("k .05, light .22", steady(0.22), kick(0.05), coupled, **beside),
         Case("k .1, light .22", steady(0.22), kick(0.1), coupled, **beside),
         Case("k .02, light .85", steady(0.85), kick(0.02), coupled, **{**beside, "frames": 100}),
-        Case("k -.1, light 1.2", steady(1.2), kick(-0.1), coupled, **{**beside, "electrons": 100.0}),
-        Case("k .05, cosine light", COSINE, kick(0.05), coupled, **{**beside, "electrons": 100.0}),
-        Case("k .05, edges at n + .6", edges, kick(0.05), (*coupled, *after(5, 20)), **{**beside, "electrons": 100.0}),
-        Case(
-            "k .005, edges at n + .6", edges, kick(0.005), (*coupled, *after(5, 20)), **{**beside, "electrons": 100.0}
-        ),
+        Case("k -.1, light 1.2", steady(1.2), kick(-0.1), coupled, **few),
+        Case("k .05, cosine light", COSINE, kick(0.05), coupled, **few),
+        Case("k .05, edges at n + .6", edges, kick(0.05), (*coupled, *after(5, 20)), **few),
+        Case("k .005, edges at n + .6", edges, kick(0.005), (*coupled, *after(5, 20)), **few),
     ]
 
 
@@ -433,8 +387,15 @@ def _readout() -> list[Case]:
         return {"clock_jitter": {"sigma_ns": ns}}
 
     edges = square(0.1, 0.7, 20, 5.6)
+    seen = (RATE, *after(5, 20), *latency(5, 20))
+    flicker = {"light_flicker": {"modulation": 0.5, "frequency_hz": 17e3}}
+    ripple = {"supply_ripple": {"ripple": 0.02, "frequency_hz": 17e3}}
+    lag = {"photodiode_lag": {"fraction": 0.5, "tau_us": 37.5}}
     rows: dict[str, Any] = {"shape": (16, 4), "groups": 48, "frames": 400}
+    short = rows | {"frames": 250}
+    fine: dict[str, Any] = {"electrons": 1000.0, "shape": (16, 2), "groups": 32, "frames": 250}
     common: dict[str, Any] = {"shape": (16, 16), "groups": 40, "frames": 150, "separate": True}
+    lines = (RATE, VARIANCE, SERIAL, A1, *line(0.425), *line(0.575))
     together = {
         "readout_skew": {"span": 0.8},
         "supply_ripple": {"ripple": 0.03, "frequency_hz": 23e3, "phase_cycles": 0.0},
@@ -444,34 +405,13 @@ def _readout() -> list[Case]:
         "dark_current": {"mean_pA": 10.0},
     }
     return [
-        Case("span .9, edges at n + .6", edges, skew(0.9), (RATE, *after(5, 20), *latency(5, 20)), **rows, quick=True),
-        Case("span 1, cosine light", COSINE, skew(1.0), (*STEADY, ROWS), **{**rows, "frames": 250}),
-        Case("span 1, strobe", strobe(0.3, 0.2, 0.3), skew(1.0), (*STEADY, ROWS), **{**rows, "frames": 250}),
-        Case(
-            "span 1, flicker 17 kHz",
-            steady(0.3),
-            skew(1.0) | {"light_flicker": {"modulation": 0.5, "frequency_hz": 17e3}},
-            (*STEADY, *line(0.425)),
-            **{**rows, "frames": 250},
-        ),
-        Case(
-            "span 1, ripple 2 % at 17 kHz",
-            steady(0.3),
-            skew(1.0) | {"supply_ripple": {"ripple": 0.02, "frequency_hz": 17e3}},
-            (*STEADY, *line(0.425)),
-            electrons=1000.0,
-            shape=(16, 2),
-            groups=32,
-            frames=250,
-        ),
-        Case(
-            "span .9, lag, edges at n + .6",
-            edges,
-            skew(0.9) | {"photodiode_lag": {"fraction": 0.5, "tau_us": 37.5}},
-            (RATE, *after(5, 20), *latency(5, 20)),
-            **rows,
-        ),
-        Case("span -1.1, edges at n + .6", edges, skew(-1.1), (RATE, *after(5, 20), *latency(5, 20)), **rows),
+        Case("span .9, edges at n + .6", edges, skew(0.9), seen, **rows, quick=True),
+        Case("span 1, cosine light", COSINE, skew(1.0), (*STEADY, ROWS), **short),
+        Case("span 1, strobe", strobe(0.3, 0.2, 0.3), skew(1.0), (*STEADY, ROWS), **short),
+        Case("span 1, flicker 17 kHz", steady(0.3), skew(1.0) | flicker, (*STEADY, *line(0.425)), **short),
+        Case("span 1, ripple 2 % at 17 kHz", steady(0.3), skew(1.0) | ripple, (*STEADY, *line(0.425)), **fine),
+        Case("span .9, lag, edges at n + .6", edges, skew(0.9) | lag, seen, **rows),
+        Case("span -1.1, edges at n + .6", edges, skew(-1.1), seen, **rows),
         Case("1.25 us", steady(0.3), jitter(1250.0), (*STEADY, *POPULATION), **common),
         Case("5 us, light .8", steady(0.8), jitter(5000.0), (*STEADY, *POPULATION), **{**common, "frames": 100}),
         Case("5 us, cosine light", COSINE, jitter(5000.0), (*STEADY, *POPULATION), **common),
@@ -480,18 +420,10 @@ def _readout() -> list[Case]:
         Case(".25 us, edges at n + .6", edges, jitter(250.0), (RATE, *after(5, 20)), **common),
         Case("p .05, 2 frames", steady(0.22), {"afterpulsing": {"probability": 0.05, "delay_frames": 2}}, STEADY),
         Case("p .3, 1 frame", steady(0.7), {"afterpulsing": {"probability": 0.3, "delay_frames": 1}}, STEADY),
-        Case("5 %", steady(0.3), {"dead_pixels": {"fraction": 0.05}}, (RATE, SPREAD), separate=True, frames=100),
+        Case("5 %", steady(0.3), {"dead_pixels": {"fraction": 0.05}}, (RATE, SPREAD), frames=100),
         Case("p .05", steady(0.3), {"missed_spikes": {"probability": 0.05}}, STEADY),
         Case("p .01", steady(0.2), {"spurious_spikes": {"probability": 0.01}}, STEADY),
-        Case(
-            "skew, ripple, flicker, lag, dead",
-            SWING,
-            together,
-            (RATE, VARIANCE, SERIAL, A1, *line(0.425), *line(0.575)),
-            electrons=500.0,
-            shape=(16, 2),
-            groups=32,
-        ),
+        Case("skew, ripple, flicker, lag, dead", SWING, together, lines, electrons=500.0, shape=(16, 2), groups=32),
     ]
 
 

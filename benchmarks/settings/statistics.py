@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -31,9 +32,9 @@ class Statistic:
 
 @dataclass(frozen=True)
 class Comparison:
-    """A statistic of the literal simulation and of an engine."""
+    """A statistic of the hidden world and of an engine."""
 
-    literal: float
+    world: float
     engine: float
     z: float
     error: float
@@ -44,9 +45,9 @@ class Comparison:
         return abs(self.z) <= LIMIT
 
 
-def compared(statistic: Statistic, literal: list[Spikes], engine: list[Spikes]) -> Comparison:
+def compared(statistic: Statistic, world: list[Spikes], engine: list[Spikes]) -> Comparison:
     """Two sets of groups by one statistic."""
-    a, b = (np.array([statistic.of(group) for group in groups], np.float64) for groups in (literal, engine))
+    a, b = (np.array([statistic.of(group) for group in groups], np.float64) for groups in (world, engine))
     if a.ndim > 1:
         return _histograms(a, b)
     mean_a, mean_b = a.mean(), b.mean()
@@ -115,13 +116,10 @@ def _serial_correlation(bits: Spikes) -> float:
     return float(np.mean((d[1:] * d[:-1])[same[1:] & same[:-1]]) / np.var(spans[same]))
 
 
-def _second_difference(k: int) -> Callable[[Spikes], float]:
-    def of(bits: Spikes) -> float:
-        pixel, frame = _spikes_in_order(bits[BURN_IN:])
-        second = frame[2 * k :] - 2 * frame[k:-k] + frame[: -2 * k]
-        return float(np.mean(np.square(second[pixel[2 * k :] == pixel[: -2 * k]], dtype=np.float64)))
-
-    return of
+def _second_difference(k: int, bits: Spikes) -> float:
+    pixel, frame = _spikes_in_order(bits[BURN_IN:])
+    second = frame[2 * k :] - 2 * frame[k:-k] + frame[: -2 * k]
+    return float(np.mean(np.square(second[pixel[2 * k :] == pixel[: -2 * k]], dtype=np.float64)))
 
 
 def _interval_histogram(bits: Spikes) -> Floats:
@@ -132,29 +130,21 @@ def _interval_histogram(bits: Spikes) -> Floats:
     return np.bincount(np.clip(d - first, 0, 7), minlength=8) / d.size
 
 
-def _after(frame: int, period: int) -> Callable[[Spikes], float]:
-    """Spikes of the frame so many after each edge, of light with an edge every `period` frames; frame: absolute."""
-
-    def of(bits: Spikes) -> float:
-        return float(bits[frame + (frame < BURN_IN) * period :: period].mean())
-
-    return of
+def _after(frame: int, period: int, bits: Spikes) -> Spikes:
+    """Bits of the frame so many after each edge, of light with an edge every `period` frames; frame: absolute."""
+    return bits[frame + (frame < BURN_IN) * period :: period]
 
 
-def _coincidence(lag: int) -> Callable[[Spikes], float]:
+def _coincidence(lag: int, bits: Spikes) -> float:
     """Of neighbours in rows and columns: E[s_i(t) s_j(t + lag)] / E[s]^2 - 1, both ways."""
-
-    def of(bits: Spikes) -> float:
-        s = bits[BURN_IN:].astype(np.float32)
-        late, soon = s[lag:], s[: len(s) - lag]
-        pairs = [
-            np.vdot(x, y) / x.size
-            for a, b in ((late, soon), (soon, late))
-            for x, y in ((a[:, 1:], b[:, :-1]), (a[:, :, 1:], b[:, :, :-1]))
-        ]
-        return float(np.mean(pairs) / s.mean(dtype=np.float64) ** 2 - 1.0)
-
-    return of
+    s = bits[BURN_IN:].astype(np.float32)
+    late, soon = s[lag:], s[: len(s) - lag]
+    pairs = [
+        np.vdot(x, y) / x.size
+        for a, b in ((late, soon), (soon, late))
+        for x, y in ((a[:, 1:], b[:, :-1]), (a[:, :, 1:], b[:, :, :-1]))
+    ]
+    return float(np.mean(pairs) / s.mean(dtype=np.float64) ** 2 - 1.0)
 
 
 def _population_variance(bits: Spikes) -> float:
@@ -162,139 +152,114 @@ def _population_variance(bits: Spikes) -> float:
     return float(np.var(bits[BURN_IN:].mean(axis=(1, 2))))
 
 
-def _population_correlation(lag: int) -> Callable[[Spikes], float]:
-    def of(bits: Spikes) -> float:
-        a = bits[BURN_IN:].mean(axis=(1, 2))
-        a = a - a.mean()
-        return float(np.mean(a[lag:] * a[:-lag]) / np.mean(a * a))
-
-    return of
+def _population_lag_1(bits: Spikes) -> float:
+    a = bits[BURN_IN:].mean(axis=(1, 2))
+    a = a - a.mean()
+    return float(np.mean(a[1:] * a[:-1]) / np.mean(a * a))
 
 
-def _line(cycles: float, quadrature: bool) -> Callable[[Spikes], float]:
-    """Amplitude of the population's rate over its mean, in phase with sin 2 pi f t at the frames' middles or with the
-    cosine."""
-
-    def of(bits: Spikes) -> float:
-        a = bits[BURN_IN:].mean(axis=(1, 2))
-        phase = 2.0 * np.pi * cycles * (np.arange(a.size) + BURN_IN + 0.5)
-        wave = np.cos(phase) if quadrature else np.sin(phase)
-        return float(2.0 * np.mean((a - a.mean()) * wave) / a.mean())
-
-    return of
+def _line(cycles: float, wave: Callable[[Floats], Floats], bits: Spikes) -> float:
+    """Amplitude of the population's rate over its mean, in phase with the wave (sine or cosine) at frames' middles."""
+    a = bits[BURN_IN:].mean(axis=(1, 2))
+    phase = 2.0 * np.pi * cycles * (np.arange(a.size) + BURN_IN + 0.5)
+    return float(2.0 * np.mean((a - a.mean()) * wave(phase)) / a.mean())
 
 
-def _slope_over_rows(frame: int, period: int) -> Callable[[Spikes], float]:
+def _slope_over_rows(frame: int, period: int, bits: Spikes) -> float:
     """How the response in a frame after each edge changes from the first row to the last."""
-
-    def of(bits: Spikes) -> float:
-        response = bits[frame + (frame < BURN_IN) * period :: period].mean(axis=(0, 2))
-        return float(np.polyfit(np.linspace(0.0, 1.0, response.size), response, 1)[0])
-
-    return of
+    response = _after(frame, period, bits).mean(axis=(0, 2))
+    return float(np.polyfit(np.linspace(0.0, 1.0, response.size), response, 1)[0])
 
 
-def _spread(axes: tuple[int, ...]) -> Callable[[Spikes], float]:
+def _spread(axes: tuple[int, ...], bits: Spikes) -> float:
     """Standard deviation over pixels, rows or columns of their rates, over the rate."""
-
-    def of(bits: Spikes) -> float:
-        rates = bits[BURN_IN:].mean(axis=axes)
-        return float(rates.std() / rates.mean())
-
-    return of
+    rates = bits[BURN_IN:].mean(axis=axes)
+    return float(rates.std() / rates.mean())
 
 
-def _quantile(q: float) -> Callable[[Spikes], float]:
-    return lambda bits: float(np.quantile(bits[BURN_IN:].mean(axis=0), q))
+def _quantile(q: float, bits: Spikes) -> float:
+    return float(np.quantile(bits[BURN_IN:].mean(axis=0), q))
 
 
-def _window_variance(frames: int) -> Callable[[Spikes], float]:
+def _window_variance(frames: int, bits: Spikes) -> float:
     """Variance of a pixel's count in windows of so many frames."""
-
-    def of(bits: Spikes) -> float:
-        s = bits[BURN_IN:]
-        s = s[: len(s) // frames * frames]
-        return float(np.var(s.reshape(-1, frames, *s.shape[1:]).sum(axis=1, dtype=np.float64)))
-
-    return of
+    s = bits[BURN_IN:]
+    s = s[: len(s) // frames * frames]
+    return float(np.var(s.reshape(-1, frames, *s.shape[1:]).sum(axis=1, dtype=np.float64)))
 
 
-def _wander(lag: int) -> Callable[[Spikes], float]:
+def _wander(lag: int, bits: Spikes) -> float:
     """Mean square change of the population's rate over so many frames, over the rate squared."""
-
-    def of(bits: Spikes) -> float:
-        a = bits.mean(axis=(1, 2))
-        return float(np.mean(np.square(a[lag:] - a[:-lag])) / a.mean() ** 2)
-
-    return of
-
-
-def _place(r: int, c: int) -> Callable[[Spikes], float]:
-    return lambda bits: float(bits[BURN_IN:, r, c].mean())
+    a = bits.mean(axis=(1, 2))
+    return float(np.mean(np.square(a[lag:] - a[:-lag])) / a.mean() ** 2)
 
 
 RATE = Statistic("rate", _rate)
 VARIANCE = Statistic("interval variance", _interval_variance)
 SERIAL = Statistic("lag-1 correlation", _serial_correlation, 1.0)
-A1, A4 = (Statistic(f"A_{k}", _second_difference(k)) for k in (1, 4))
+A1, A4 = (Statistic(f"A_{k}", partial(_second_difference, k)) for k in (1, 4))
 HISTOGRAM = Statistic("interval histogram", _interval_histogram)
-COINCIDENCE = tuple(Statistic(f"neighbours, lag {k}", _coincidence(k), 1.0) for k in (0, 1))
+COINCIDENCE = tuple(Statistic(f"neighbours, lag {k}", partial(_coincidence, k), 1.0) for k in (0, 1))
 POPULATION = (
     Statistic("population variance", _population_variance),
-    Statistic("population lag 1", _population_correlation(1), 1.0),
+    Statistic("population lag 1", _population_lag_1, 1.0),
 )
-SPREAD = Statistic("spread of pixels", _spread((0,)))
-ROWS = Statistic("spread of rows", _spread((0, 2)))
-COLUMNS = Statistic("spread of columns", _spread((0, 1)))
-QUANTILES = tuple(Statistic(f"quantile {q:g}", _quantile(q)) for q in (0.1, 0.5, 0.9, 0.99))
+SPREAD = Statistic("spread of pixels", partial(_spread, (0,)))
+ROWS = Statistic("spread of rows", partial(_spread, (0, 2)))
+COLUMNS = Statistic("spread of columns", partial(_spread, (0, 1)))
+QUANTILES = tuple(Statistic(f"quantile {q:g}", partial(_quantile, q)) for q in (0.1, 0.5, 0.9, 0.99))
 STEADY = (RATE, VARIANCE, SERIAL, A1, A4, HISTOGRAM)
 
 
 def after(edge: int, period: int, frames: tuple[int, ...] = (0, 1, 2, 4, 8)) -> tuple[Statistic, ...]:
     """Response in these frames after an edge in frame `edge` of every period."""
-    return tuple(Statistic(f"{n} frames after", _after((edge + n) % period, period)) for n in frames)
+
+    def response(frame: int, bits: Spikes) -> float:
+        return float(_after(frame, period, bits).mean())
+
+    return tuple(Statistic(f"{n} frames after", partial(response, (edge + n) % period)) for n in frames)
 
 
 def line(cycles: float) -> tuple[Statistic, ...]:
     """The line at so many cycles a frame."""
-    return (
-        Statistic("line, in phase", _line(cycles, False), 1.0),
-        Statistic("line, quadrature", _line(cycles, True), 1.0),
-    )
+    waves = {"in phase": np.sin, "quadrature": np.cos}
+    return tuple(Statistic(f"line, {name}", partial(_line, cycles, wave), 1.0) for name, wave in waves.items())
 
 
 def latency(edge: int, period: int) -> tuple[Statistic, ...]:
     """How the frames of and after an edge change over rows."""
-    return tuple(
-        Statistic(f"rows, {n} frames after", _slope_over_rows((edge + n) % period, period), 1.0) for n in (0, 1)
-    )
+    slopes = {n: partial(_slope_over_rows, (edge + n) % period, period) for n in (0, 1)}
+    return tuple(Statistic(f"rows, {n} frames after", slope, 1.0) for n, slope in slopes.items())
 
 
 def bands(n: int) -> tuple[Statistic, ...]:
     """Interval variance in each of n bands of rows."""
 
-    def in_band(k: int) -> Callable[[Spikes], float]:
-        return lambda bits: _interval_variance(np.array_split(bits, n, axis=1)[k])
+    def in_band(k: int, bits: Spikes) -> float:
+        return _interval_variance(np.array_split(bits, n, axis=1)[k])
 
-    return tuple(Statistic(f"interval variance, band {k + 1} of {n}", in_band(k)) for k in range(n))
+    return tuple(Statistic(f"interval variance, band {k + 1} of {n}", partial(in_band, k)) for k in range(n))
 
 
 def windows(*frames: int) -> tuple[Statistic, ...]:
-    return tuple(Statistic(f"variance in {n} frames", _window_variance(n)) for n in frames)
+    return tuple(Statistic(f"variance in {n} frames", partial(_window_variance, n)) for n in frames)
 
 
 def wander(*lags: int) -> tuple[Statistic, ...]:
-    return tuple(Statistic(f"change over {n} frames", _wander(n)) for n in lags)
+    return tuple(Statistic(f"change over {n} frames", partial(_wander, n)) for n in lags)
 
 
 def places(*at: tuple[int, int]) -> tuple[Statistic, ...]:
-    return tuple(Statistic(f"pixel {r}, {c}", _place(r, c)) for r, c in at)
+    def place(r: int, c: int, bits: Spikes) -> float:
+        return float(bits[BURN_IN:, r, c].mean())
+
+    return tuple(Statistic(f"pixel {r}, {c}", partial(place, r, c)) for r, c in at)
 
 
 def moments(*frames: int) -> tuple[Statistic, ...]:
     """Share that fires in these frames of the recording."""
-    return tuple(Statistic(f"frame {n}", _moment(n)) for n in frames)
 
+    def share(frame: int, bits: Spikes) -> float:
+        return float(bits[frame].mean())
 
-def _moment(frame: int) -> Callable[[Spikes], float]:
-    return lambda bits: float(bits[frame].mean())
+    return tuple(Statistic(f"frame {n}", partial(share, n)) for n in frames)
