@@ -77,6 +77,7 @@ docs: install-dev
 lint: install-dev
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
+	$(BIN)/python -m tools.function_sizes
 	$(BIN)/python -m tools.words >/dev/null || $(BIN)/python -m tools.words
 	$(BIN)/python -c 'import sys; sys.exit(sys.version_info >= (3, 11))' || $(BIN)/mypy  # the numpy of 3.10 has other types
 	$(BIN)/lint-imports

@@ -31,7 +31,7 @@ from __future__ import annotations
 
 from collections.abc import Container, Iterator
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -235,6 +235,23 @@ def _mirror(frames: NDArray[np.int64], count: int) -> NDArray[np.int64]:
     return np.minimum(folded, 2 * count - 1 - folded)
 
 
+class _Row(NamedTuple):
+    """Numbers of a row of pixels (W,), or for each half width (n, W)."""
+
+    last: NDArray[np.int32]
+    """Frame of the last spike."""
+    following: NDArray[np.int32]
+    """Frame of the next."""
+    counted: NDArray[np.int32]
+    """Spikes so far."""
+    begins: NDArray[np.int32]
+    """Frame of the last spike at or before middle - half_width."""
+    counted_begin: NDArray[np.int32]
+    """Spikes up to it."""
+    counted_end: NDArray[np.int32]
+    """Spikes before middle + half_width."""
+
+
 @njit(cache=True, nogil=True)
 def _interval_planes(
     frames: NDArray[np.uint8],
@@ -246,70 +263,102 @@ def _interval_planes(
     planes: NDArray[np.float32],
 ) -> None:
     """1/ISI at start .. start + count, then n / (t_n - t_0) about the middle; frames[0] is frame `first`."""
-    stop = first + frames.shape[0]
-    height, width = last_before.shape
-    middle = start + count // 2
+    width = last_before.shape[1]
     widths = len(half_widths)
-    counted = np.empty(width, np.int32)
-    begins = np.empty((widths, width), np.int32)  # the last spike at or before middle - half_width
-    counted_begin = np.empty((widths, width), np.int32)
-    counted_end = np.empty((widths, width), np.int32)  # spikes before middle + half_width
-    last = np.empty(width, np.int32)
-    following = np.empty(width, np.int32)
-    for y in range(height):
-        for x in range(width):
-            last[x] = last_before[y, x]
-            counted[x] = 0
-        for i in range(widths):
-            for x in range(width):
-                begins[i, x] = last[x]
-                counted_begin[i, x] = 0
-                counted_end[i, x] = 0
-        for t in range(first, stop):
-            for x in range(width):
-                if frames[t - first, y, x]:
-                    last[x] = t
-                    counted[x] += 1
-            if start <= t < start + count:
-                for x in range(width):
-                    planes[t - start, y, x] = last[x]
-            for i in range(widths):
-                if t <= middle - half_widths[i]:
-                    for x in range(width):
-                        begins[i, x] = last[x]
-                        counted_begin[i, x] = counted[x]
-                if t < middle + half_widths[i]:
-                    for x in range(width):
-                        counted_end[i, x] = counted[x]
-        for t in range(stop, start + count):  # past the end of the stream: hold
-            for x in range(width):
-                planes[t - start, y, x] = last[x]
-        for i in range(widths):
-            for x in range(width):
-                n = counted[x] - counted_begin[i, x]
-                if begins[i, x] < 0:  # the stream is young: count
-                    planes[count + i, y, x] = counted[x] / np.float32(stop)
-                elif n > 0:
-                    planes[count + i, y, x] = n / np.float32(last[x] - begins[i, x])
-                else:
-                    planes[count + i, y, x] = np.float32(1.0) / np.float32(stop - begins[i, x])
-        for x in range(width):
-            following[x] = stop
-        for t in range(max(stop, start + count) - 1, start - 1, -1):
-            if t < start + count:
-                for x in range(width):
-                    interval = max(following[x], t + 1) - planes[t - start, y, x]
-                    planes[t - start, y, x] = np.float32(1.0) / np.float32(interval)
-            if t < stop:
-                for x in range(width):
-                    if frames[t - first, y, x]:
-                        following[x] = t
-            for i in range(widths):
-                if t == middle + half_widths[i] and t < stop:
-                    for x in range(width):
-                        if following[x] < stop and begins[i, x] >= 0:
-                            n = counted_end[i, x] + 1 - counted_begin[i, x]
-                            planes[count + i, y, x] = n / np.float32(following[x] - begins[i, x])
+    one, many = np.empty((3, width), np.int32), np.empty((3, widths, width), np.int32)
+    row = _Row(one[0], one[1], one[2], many[0], many[1], many[2])
+    for y in range(len(last_before)):
+        row.last[:] = last_before[y]
+        row.counted[:] = 0
+        row.begins[:] = last_before[y]
+        row.counted_begin[:] = 0
+        row.counted_end[:] = 0
+        spikes, out = frames[:, y], planes[:, y]
+        _count_spikes(row, spikes, first, start, count, half_widths, out)
+        _rates_so_far(row, first + len(spikes), count, out)
+        _look_back(row, spikes, first, start, count, half_widths, out)
+
+
+@njit(inline="always")
+def _count_spikes(
+    row: _Row,
+    spikes: NDArray[np.uint8],
+    first: int,
+    start: int,
+    count: int,
+    half_widths: NDArray[np.int64],
+    out: NDArray[np.float32],
+) -> None:
+    """Forwards: the last spike of each frame of the window, and spikes up to the ends of each half width."""
+    last, counted = row.last, row.counted
+    begins, counted_begin, counted_end = row.begins, row.counted_begin, row.counted_end
+    stop, middle = first + len(spikes), start + count // 2
+    for t in range(first, stop):
+        for x in range(last.size):
+            if spikes[t - first, x]:
+                last[x] = t
+                counted[x] += 1
+        if start <= t < start + count:
+            for x in range(last.size):
+                out[t - start, x] = last[x]
+        for i in range(len(half_widths)):
+            if t <= middle - half_widths[i]:
+                for x in range(last.size):
+                    begins[i, x] = last[x]
+                    counted_begin[i, x] = counted[x]
+            if t < middle + half_widths[i]:
+                for x in range(last.size):
+                    counted_end[i, x] = counted[x]
+    for t in range(stop, start + count):  # past the end of the stream: hold
+        for x in range(last.size):
+            out[t - start, x] = last[x]
+
+
+@njit(inline="always")
+def _rates_so_far(row: _Row, stop: int, count: int, out: NDArray[np.float32]) -> None:
+    """Rates about the middle, as far as the stream goes."""
+    last, counted, begins, counted_begin = row.last, row.counted, row.begins, row.counted_begin
+    for i in range(len(begins)):
+        for x in range(last.size):
+            n = counted[x] - counted_begin[i, x]
+            if begins[i, x] < 0:  # the stream is young: count
+                out[count + i, x] = counted[x] / np.float32(stop)
+            elif n > 0:
+                out[count + i, x] = n / np.float32(last[x] - begins[i, x])
+            else:
+                out[count + i, x] = np.float32(1.0) / np.float32(stop - begins[i, x])
+
+
+@njit(inline="always")
+def _look_back(
+    row: _Row,
+    spikes: NDArray[np.uint8],
+    first: int,
+    start: int,
+    count: int,
+    half_widths: NDArray[np.int64],
+    out: NDArray[np.float32],
+) -> None:
+    """Backwards: intervals up to the next spike, and rates whose last spike is in the stream."""
+    following, begins = row.following, row.begins
+    counted_begin, counted_end = row.counted_begin, row.counted_end
+    stop, middle = first + len(spikes), start + count // 2
+    following[:] = stop
+    for t in range(max(stop, start + count) - 1, start - 1, -1):
+        if t < start + count:
+            for x in range(following.size):
+                interval = max(following[x], t + 1) - out[t - start, x]
+                out[t - start, x] = np.float32(1.0) / np.float32(interval)
+        if t < stop:
+            for x in range(following.size):
+                if spikes[t - first, x]:
+                    following[x] = t
+        for i in range(len(half_widths)):
+            if t == middle + half_widths[i] and t < stop:
+                for x in range(following.size):
+                    if following[x] < stop and begins[i, x] >= 0:
+                        n = counted_end[i, x] + 1 - counted_begin[i, x]
+                        out[count + i, x] = n / np.float32(following[x] - begins[i, x])
 
 
 @njit(cache=True, nogil=True)

@@ -76,7 +76,7 @@ def bench_sensor(
 
         Engine "fast" gives one byte a pixel, "fast, packed" one bit.  "bytes written, no more" fills the same frames
         with a constant, the limit of the memory.  "light new in every frame" has a key at each frame.  64 such frames
-        go in one call, or one at a time, without looking ahead (`kernels.ahead`).  One frame at a time, "fast" is
+        go in one call, or one at a time, without looking ahead (`compiled.ahead`).  One frame at a time, "fast" is
         `SpikeSensor.step` on keys 64 frames apart.
     """
     rows: list[dict[str, Any]] = []

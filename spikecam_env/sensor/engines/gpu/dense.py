@@ -3,7 +3,7 @@
     in frame k a pixel fires if F(k + 1) >= x           F: grains collected (`light`), x: grains at which it fires next
     x <- x + GRAINS (1 + s z)                           z: draw number `fired` of the pixel; again while F(k + 1) >= x
 
-The hash and the polynomial are those of `compiled_tools.draws`, where they are explained.  torch has no unsigned
+The hash and the polynomial are those of `ground.draws`, where they are explained.  torch has no unsigned
 arithmetic to speak of: int32 wraps alike in + and *, and a shift to the right is masked.
 """
 

@@ -1,6 +1,6 @@
 """The cuda engine in Triton: from spike to spike, a block of one camera's pixels to a program.
 
-The law and the names are those of `kernels.loop`, the hash is that of `compiled_tools.draws`.  It is launched without
+The law and the names are those of `compiled.tile`, the hash is that of `ground.draws`.  It is launched without
 fusing of multiply and add, so that light and draws round as on a processor.  The root of a crossing may round anyhow:
 integers decide on which side of it the crossing lies.
 
