@@ -41,10 +41,6 @@ class Estimate:
     """Low and high end of 90 %, of the coordinate that was fitted (`fit.coordinates`); None where no error is known."""
 
 
-MOST_CONFIDENCE = 0.99
-"""Confidence in a name without a rival: an effect outside of the catalogue may explain as much."""
-
-
 @dataclass(frozen=True)
 class NamedEffect:
     """An effect found."""
@@ -135,27 +131,6 @@ class Ranked:
     accepted: bool
     reason: str
     """Why it was accepted or rejected."""
-
-
-LEAST_STATED = 0.05
-"""Misfit that a candidate removes, from which it is stated with one decimal."""
-
-
-def why_rejected(misfit: float, before: float, best: str, needed: float) -> str:
-    """Why a candidate was not added, by its misfit alone.
-
-    Args:
-        misfit: that the candidate leaves.
-        before: misfit that its step started from.
-        best: the candidate that was preferred.
-        needed: misfit that an effect has to remove to be added.
-    """
-    removed = before - misfit
-    if removed < LEAST_STATED:
-        return "explains nothing"
-    if removed < needed:
-        return f"removes {removed:.1f} of the misfit; an effect must remove {needed:g}"
-    return f"larger misfit than {best.replace('_', ' ')}"
 
 
 @dataclass(frozen=True)

@@ -41,7 +41,7 @@ CONSTANTS = {
     ),
     "concluding": ("large_share", "local_noises", "times_expected", "least_frames", "line_ratio"),
     "bounding": ("most_effect_size", "overshoot"),
-    "maps": ("steps",),
+    "maps": ("steps", "most_left"),
 }
 """Numbers that were settings once, by stage."""
 
@@ -255,6 +255,11 @@ class Concluding:
         TUNED,
     )
 
+    @property
+    def least_margin_map(self) -> float:
+        """As `least_margin`, of maps of rates: half of it, since all candidates change the same few statistics."""
+        return self.least_margin / 2
+
 
 @dataclass(frozen=True)
 class Bounding:
@@ -276,12 +281,6 @@ class MapSettings:
 
     units: int = setting(8, "units", "Over which a prediction is averaged.", CHOICE, least=2)
     most_effects: int = setting(5, "effects", "Named together.", CHOICE)
-    most_left: float = setting(
-        0.08,
-        "of the mean square beyond chance",
-        "A name may leave so much.",
-        "of a mean square: statistics of maps are hundreds of noises off",
-    )
 
 
 @dataclass(frozen=True)
@@ -351,6 +350,17 @@ class DiagnosisSettings:
             return cls.of(changes)
         except InputError as error:
             raise InputError(f"{os.fspath(path)}: {error}") from error
+
+    @property
+    def of_maps(self) -> DiagnosisSettings:
+        """The settings of a search in maps of rates, which has `maps` in place of some others."""
+        return replace(
+            self,
+            deviance=replace(self.deviance, accept=self.deviance.accept_map),
+            twins=replace(self.twins, drawn_units=self.maps.units),
+            searching=replace(self.searching, most_effects=self.maps.most_effects),
+            concluding=replace(self.concluding, least_margin=self.concluding.least_margin_map),
+        )
 
     def changed(self) -> dict[str, Any]:
         """Settings that differ from their defaults: {"stage.name": value}."""

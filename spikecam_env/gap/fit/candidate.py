@@ -18,12 +18,14 @@ from spikecam_env.gap.candidates.table import candidate
 from spikecam_env.gap.compare.distance import effect_size
 from spikecam_env.gap.compare.prediction import Prediction, with_change_scaled
 from spikecam_env.gap.compare.step import likeliest, scale_to, slope_of, step_of
-from spikecam_env.gap.fit.gauss_newton import COMPARED, LONGEST_STEP, MOST_STEPS, SMALL_STEP
+from spikecam_env.gap.fit.gauss_newton import COMPARED, LONGEST_STEP, MOST_STEPS, SMALL_STEP, UNITS_OF_MAPS
 from spikecam_env.gap.fit.hypothesis import Fit
 from spikecam_env.gap.fit.problem import Problem
 from spikecam_env.gap.fit.recordings import OF_RANDOM_COURSE, twins_of
+from spikecam_env.gap.fit.shapes import with_fitted_shapes
 from spikecam_env.gap.unit.indirect_inference import extrapolated_unit, has_converged
 from spikecam_env.gap.unit.refit import BaseFit, constrained_refit
+from spikecam_env.sensor import CATALOGUE
 from spikecam_env.types import Floats
 
 VISIBLE = 4.0
@@ -54,6 +56,8 @@ def fit(
         white: s^2 of the unit at `start`, over the refit's.
     """
     problem.begin(f"fitting {name}")
+    if problem.case.rates_only:
+        return _fit_maps(problem, name, start)
     if candidate(name).is_pattern:
         return _fit_pattern(problem, name, start)
     if candidate(name).random_course:
@@ -246,6 +250,15 @@ def _fit_random_course(problem: Problem, name: str, parameters: dict[str, float]
     predicted = with_change_scaled(problem.null, predicted, factor)
     sds = {strength: parameters[strength] * max(sd, np.sqrt(2.0 / len(only))) / power}
     return problem.fit_of(name, parameters, with_effect(problem.model, name, parameters), base, predicted, sds)
+
+
+def _fit_maps(problem: Problem, name: str, start: Mapping[str, float]) -> Fit:
+    """All parameters of a pattern, with the spreads of the unit, by maps of rates."""
+    all_of = bounded(name, CATALOGUE[name]().parameters() | dict(start))
+    model = with_effect(problem.model, name, all_of)
+    own = {key: all_of[key] for key in problem.fitted_parameters(name)}
+    predicted = problem.with_pattern(model, problem.null.prediction, UNITS_OF_MAPS)
+    return with_fitted_shapes(problem, problem.fit_of(name, own, model, problem.case.base, predicted))
 
 
 def _fit_pattern(problem: Problem, name: str, start: Mapping[str, float]) -> Fit:

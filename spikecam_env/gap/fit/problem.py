@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from spikecam_env.gap.candidates.table import candidate
 from spikecam_env.gap.compare.distance import freedom_of, is_significant, residual, residual_and_misfit
 from spikecam_env.gap.compare.prediction import Null, Prediction, law_error, own_variance
 from spikecam_env.gap.fit.hypothesis import Fit, Hypothesis
@@ -15,8 +16,11 @@ from spikecam_env.gap.fit.recordings import recordings_affected
 from spikecam_env.gap.settings import DiagnosisSettings
 from spikecam_env.gap.twins.case import Case
 from spikecam_env.gap.unit.refit import BaseFit
-from spikecam_env.sensor import SensorModel
+from spikecam_env.sensor import CATALOGUE, SensorModel
 from spikecam_env.types import Floats
+
+CENTRE = ("centre_x", "centre_y")
+"""Parameters that maps of rates show, and a refit of single pixels takes for their own response."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -74,6 +78,11 @@ class Problem:
     def residual_and_misfit(self, predicted: Prediction) -> tuple[Floats, float]:
         """((S,) residual, misfit) of a prediction on the recordings to fit."""
         return residual_and_misfit(self.null, self.seen, predicted)
+
+    def fitted_parameters(self, name: str) -> tuple[str, ...]:
+        """Parameters of an effect that are fitted: those that it declares, and in maps of rates its centre."""
+        centre = (p for p in CENTRE if p in CATALOGUE[name].__dataclass_fields__)
+        return (*candidate(name).fitted, *(centre if self.case.rates_only else ()))
 
     def misfit(self, predicted: Prediction | None = None) -> float:
         """Misfit of a prediction on the recordings to fit; default: of the model itself."""

@@ -36,13 +36,16 @@ def recordings_affected(case: Case, names: Sequence[str], null: Null, measured: 
     """Recordings to fit on which effects show, or a disagreement is, by index; all where there is none.
 
     They include those that the refit rests on: it takes up the effects' mean, and the others are judged by it.  Effects
-    that leave steady uniform light alone need only the others, unless the refit rests on one of these.
+    that leave steady uniform light alone need only the others, unless the refit rests on one of these.  Maps of rates
+    are not simulated: their twins are fresh units.
 
     Args:
         null: the prediction without them.
         measured: (S,) statistics.
         effect: (S,) change of the statistics by the effects.
     """
+    if case.rates_only:
+        return []
     off = np.maximum(np.abs(effect), np.abs(np.nan_to_num(measured - null.mean)))
     seen = off > CLEAR * null.noise
     shows = {k.recording for k, s in zip(null.keys, seen, strict=True) if s}

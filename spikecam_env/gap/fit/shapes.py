@@ -12,7 +12,7 @@ import numpy as np
 from spikecam_env.gap.candidates.table import candidate
 from spikecam_env.gap.compare.distance import is_significant
 from spikecam_env.gap.fit.coordinates import error_of
-from spikecam_env.gap.fit.gauss_newton import COMPARED, Descent, Free, descend, probe_of
+from spikecam_env.gap.fit.gauss_newton import COMPARED, Descent, Free, descend, probe_of, spreads_of
 from spikecam_env.gap.fit.hypothesis import Fit
 from spikecam_env.gap.fit.problem import Problem
 from spikecam_env.gap.fit.recordings import twins_of
@@ -43,7 +43,7 @@ def with_fitted_shapes(problem: Problem, fitted: Fit) -> Fit:
     problem.begin(f"fitting the shape of {name}")
     only = problem.affected([name], fitted.prediction.mean - problem.null.mean)
     probe = probe_of(problem, [name], only, twins_of(name))
-    free = [(name, key) for key in candidate(name).fitted]
+    free = [*((name, key) for key in problem.fitted_parameters(name)), *spreads_of(problem, fitted.model)]
     end = descend(problem, probe, fitted.model, fitted.base, free, COMPARED)
     shaped = where_ended(problem, fitted, end, free)
     return fitted if shaped.misfit > fitted.misfit else shaped

@@ -20,7 +20,14 @@ from spikecam_env.gap.compare.distance import in_noise, is_significant, loss
 from spikecam_env.gap.fit.confirm import confirmed, with_dark_levels_open, with_prediction
 from spikecam_env.gap.fit.gauss_newton import PROBES
 from spikecam_env.gap.fit.hypothesis import Fit
-from spikecam_env.gap.fit.joint import is_noisy, no_smaller, refined_together, simulated_for, stepped_once
+from spikecam_env.gap.fit.joint import (
+    is_noisy,
+    no_smaller,
+    refined_together,
+    simulated_for,
+    stepped_once,
+    with_unit_fitted,
+)
 from spikecam_env.gap.fit.last_step import Errors
 from spikecam_env.gap.fit.problem import Problem
 from spikecam_env.gap.screen.templates import Templates
@@ -45,7 +52,6 @@ from spikecam_env.gap.search.round import (
     is_visible,
 )
 from spikecam_env.gap.search.shortlist import fits_of, groups_that_stand_out, screened_beside, starts_to_fit
-from spikecam_env.gap.unit.refit import constrained_refit
 
 JOIN = 2 * PER_PARAMETER
 """Misfit that a later effect has to remove to earn a joint refit: two parameters without a meaning.  Less than
@@ -58,24 +64,26 @@ ANOTHER = {1: SECOND, 2: "a third effect"}
 """Name of the search for one effect more, by the number that was added."""
 
 
-def forward_selection(problem: Problem, names: Sequence[str], templates: Templates) -> list[Round]:
+def forward_selection(problem: Problem, names: Sequence[str], templates: Templates | None) -> list[Round]:
     """Add the candidate that leaves least, round by round, until nothing is left or nothing helps.
 
     Args:
         problem: the problem of the model as given.
+        templates: of the candidates; None for maps of rates.
 
     Returns:
         The rounds that added an effect, and a last one with the final model.
     """
     rounds: list[Round] = []
     given, null, settings = problem, problem.null, problem.settings
-    now = problem.hypothesis(problem.model, constrained_refit(problem.model, problem.case.base), null.prediction)
+    now = with_unit_fitted(problem)
     while len(rounds) < settings.searching.most_effects:
-        by_fit = not problem.is_explained(now.prediction) if rounds else is_discrepant(null, problem.seen)
-        if rounds and not by_fit and problem.fitted_to_all.is_explained(now.prediction):
+        as_given = now.model is problem.model
+        by_fit = is_discrepant(null, problem.seen) if as_given else not problem.is_explained(now.prediction)
+        if not as_given and not by_fit and problem.fitted_to_all.is_explained(now.prediction):
             break
         cost = settings.searching.campaigns_per_effect * len(problem.case.conditions)
-        if rounds and not problem.allows(ANOTHER[len(rounds)], cost, needed=len(rounds) == 1):
+        if rounds and not problem.allows(ANOTHER.get(len(rounds), "another effect"), cost, needed=len(rounds) == 1):
             break
         if not by_fit:
             problem = Problem.of(with_held_out_motion(problem.case), problem.model, null, problem.values)
@@ -105,7 +113,9 @@ def forward_selection(problem: Problem, names: Sequence[str], templates: Templat
     return try_cancelling_pair(problem, names, [*rounds, Round(now)])
 
 
-def with_candidates(problem: Problem, here: Problem, names: Sequence[str], templates: Templates, turn: Round) -> Round:
+def with_candidates(
+    problem: Problem, here: Problem, names: Sequence[str], templates: Templates | None, turn: Round
+) -> Round:
     """The round with its candidates: screened, fitted, confirmed, the chosen one first.
 
     Args:

@@ -91,8 +91,7 @@ def absent(case: Case, given: SensorModel, model: SensorModel) -> set[str]:
     return {
         name
         for name, parameters in added.items()
-        if parameters[candidate(name).strength] == 0
-        or expected_events(name, parameters, case.conditions, case.observations) < LEAST_EVENTS
+        if parameters[candidate(name).strength] == 0 or expected_events(name, parameters, case) < LEAST_EVENTS
     }
 
 

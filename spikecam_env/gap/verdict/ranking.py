@@ -8,9 +8,12 @@ import numpy as np
 
 from spikecam_env.gap.candidates.table import candidate
 from spikecam_env.gap.fit.hypothesis import Fit
-from spikecam_env.gap.result import Ranked, why_rejected
+from spikecam_env.gap.result import Ranked
 from spikecam_env.gap.search.round import Round
 from spikecam_env.gap.verdict.named_effects import estimates
+
+LEAST_STATED = 0.05
+"""Misfit that a candidate removes, from which it is stated with one decimal."""
 
 
 def ranking(rounds: Sequence[Round], found: Sequence[tuple[Fit, Round]], accept: float) -> tuple[Ranked, ...]:
@@ -54,3 +57,20 @@ def _reason_against_better(fit: Fit, chosen: Fit) -> str:
         return "smaller misfit in a single simulation; further ones did not confirm it"
     preferred = chosen.name.replace("_", " ")
     return f"smaller misfit, but all recordings together, and the number of parameters, favour {preferred}"
+
+
+def why_rejected(misfit: float, before: float, best: str, needed: float) -> str:
+    """Why a candidate was not added, by its misfit alone.
+
+    Args:
+        misfit: that the candidate leaves.
+        before: misfit that its step started from.
+        best: the candidate that was preferred.
+        needed: misfit that an effect has to remove to be added.
+    """
+    removed = before - misfit
+    if removed < LEAST_STATED:
+        return "explains nothing"
+    if removed < needed:
+        return f"removes {removed:.1f} of the misfit; an effect must remove {needed:g}"
+    return f"larger misfit than {best.replace('_', ' ')}"

@@ -121,7 +121,7 @@ class EffectProbe:
 
     def events(self, parameters: Parameters) -> float:
         """Expected number of events of an effect of single events, infinite elsewhere."""
-        return expected_events(self.name, parameters, self.case.conditions, self.case.observations)
+        return expected_events(self.name, parameters, self.case)
 
     def score(self, parameters: Parameters) -> Score | None:
         """The score by the statistics that the effect changes; None where it changes none."""

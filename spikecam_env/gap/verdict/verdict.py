@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from spikecam_env.gap.baseline.off_nominal import OffNominal, off_nominal, with_strengths
+from spikecam_env.gap.baseline.off_nominal import OffNominal, off_nominal, spreads_off, with_strengths
 from spikecam_env.gap.candidates.table import candidate
 from spikecam_env.gap.compare.distance import adjusted, deviates, residual
 from spikecam_env.gap.compare.prediction import Null
@@ -62,7 +62,7 @@ def conclude(comparison: Comparison, rounds: Sequence[Round], floor: float) -> C
     by_chance = not rounds or may_be_chance(comparison, found)
     explained = Explanation(EXPLAINS_ALL) if by_chance else explanation_of(null, comparison.values, rounds)
     is_clean = explained.degree == EXPLAINS_ALL
-    off = parameters_off(comparison, rounds) if is_clean else {}
+    off = parameters_off(comparison, rounds) if is_clean or case.rates_only else {}
     verdict = verdict_of(comparison, rounds, found, explained.degree) or ("parameter" if off else "none")
     model = patched_model(comparison, rounds)
     return Conclusion(
@@ -102,7 +102,8 @@ def verdict_of(
     enough = found and degree != UNKNOWN and not second_left_out(comparison.case)
     if comparison.contradictions:
         return "data"
-    if rounds and not may_be_chance(comparison, found) and not enough:
+    unexplained = found or degree != EXPLAINS_ALL
+    if rounds and unexplained and not may_be_chance(comparison, found) and not enough:
         return "unknown"
     if any(r.rivals for _, r in found) and not comparison.missing:
         return "class" if degree == EXPLAINS_ALL else "unknown"
@@ -124,6 +125,8 @@ def parameters_off(comparison: Comparison, rounds: Sequence[Round]) -> dict[str,
     if not rounds or comparison.missing:
         return comparison.off.parameters
     case, tested, last = comparison.case, comparison.tested, rounds[-1].start
+    if case.rates_only:
+        return spreads_off(case, tested, last.model)
     off = off_beside(case, tested, last, last.base).parameters
     refits = [d.refit for d in last.prediction.draws if d.refit is not None]
     as_read = [off_beside(case, tested, last, refit).parameters for refit in refits[-1:]] if off else []
