@@ -38,8 +38,8 @@ class Missing:
 
 def missing_effects(case: Case, model: SensorModel, names: Sequence[str]) -> list[Missing]:
     """Effects that the refit shows and the model lacks, of the candidates in `names`; in the order of the pixel."""
-    found = [_built(one) for one in (*_response(case, model), *_dark_level(case, model)) if one.name in names]
-    return found + [_built(one) for one in _noise(case, with_missing(model, found)) if one.name in names]
+    missing = [_built(one) for one in (*_response(case, model), *_dark_level(case, model)) if one.name in names]
+    return missing + [_built(one) for one in _noise(case, with_missing(model, missing)) if one.name in names]
 
 
 class _Size(NamedTuple):
@@ -101,9 +101,9 @@ def _root_of_twice(live: NDArray[np.bool_]) -> float:
     return float(np.sqrt(2 * live.sum()))
 
 
-def with_missing(model: SensorModel, found: Sequence[Missing]) -> SensorModel:
+def with_missing(model: SensorModel, missing: Sequence[Missing]) -> SensorModel:
     """The model with all that was found."""
-    for m in found:
+    for m in missing:
         model = model.with_effect(m.effect)
     return model
 

@@ -49,16 +49,18 @@ def audit(case: Case) -> list[Contradiction]:
 
 def silent(case: Case, suspect: set[str]) -> list[Contradiction]:
     """Lit recordings without spikes, and any that never stop."""
-    found = []
+    contradictions = []
     all_frames, usual = 1 - case.settings.baseline.least_error, case.settings.unit.usual
     for c, o in zip(case.conditions, case.observations, strict=True):
         mean = float(o.times.count.mean()) / o.frames
         if c.light is not None and c.level > 0 and mean == 0:
-            found.append(Contradiction("silent", (c.name,), f"{c.name}: labelled radiance {c.level:g}, but no spikes"))
+            contradictions.append(
+                Contradiction("silent", (c.name,), f"{c.name}: labelled radiance {c.level:g}, but no spikes")
+            )
         if c.light is not None and c.level * usual < 1 and mean > all_frames:
             text = f"{c.name}: labelled radiance {c.level:g}, but every pixel fires in every frame"
-            found.append(Contradiction("silent", (c.name,), text))
-    return found
+            contradictions.append(Contradiction("silent", (c.name,), text))
+    return contradictions
 
 
 def _steady_levels(case: Case, suspect: set[str]) -> tuple[list[str], Floats, Floats]:

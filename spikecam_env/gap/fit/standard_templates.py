@@ -141,9 +141,9 @@ def _kept(key: str, name: str) -> Templates | None:
     path = _path(key)
     if key not in _IN_MEMORY and path is not None:
         with suppress(InputError):
-            found = read_templates(path)
-            if found.laws == {name: law_digest(CATALOGUE[name])}:
-                _IN_MEMORY[key] = found
+            stored = read_templates(path)
+            if stored.laws == {name: law_digest(CATALOGUE[name])}:
+                _IN_MEMORY[key] = stored
     return _IN_MEMORY.get(key)
 
 

@@ -84,22 +84,22 @@ class StatisticKey(NamedTuple):
 
 def statistics_bank(reading: CampaignReading) -> dict[StatisticKey, float]:
     """Every statistic of a campaign, but for those of the pattern."""
-    found = {}
+    bank = {}
     for i, condition in enumerate(reading.conditions):
         for group, statistics in GROUPS.items():
             for name, value in statistics(reading, i).items():
-                found[StatisticKey(group, condition.name, name)] = value
-    return found
+                bank[StatisticKey(group, condition.name, name)] = value
+    return bank
 
 
 def pattern_bank(reading: CampaignReading) -> dict[StatisticKey, float]:
     """The pattern statistics of a measurement's rate maps: of the dark recording and of every flat."""
-    found = {}
+    bank = {}
     for condition, o in zip(reading.conditions, reading.observations, strict=True):
         if condition.kind in ("dark", "flat"):
             for name, value in pattern.statistics(o.rate.reshape(o.shape)).items():
-                found[StatisticKey("pattern", condition.name, name)] = value
-    return found
+                bank[StatisticKey("pattern", condition.name, name)] = value
+    return bank
 
 
 __getattr__ = old_names(__name__, {"Key": "StatisticKey"})

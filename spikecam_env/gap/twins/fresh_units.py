@@ -109,7 +109,7 @@ def _pattern_statistics(
     gain, dark = drawn_response(model, base, shape, seed)
     charge = drawn_traps(model, shape, seed)
     rng, phases, false = (np.random.default_rng([seed, n]) for n in (1, 2, 3))
-    found = {}
+    bank = {}
     for c in shown:
         if c.kind not in ("dark", "flat") or c.light is None:
             continue
@@ -122,5 +122,5 @@ def _pattern_statistics(
         read = np.where(count > 1, read, count / c.frames)  # as `ObservedRecording.rate`: one spike has no interval
         read = read_with_false_spikes(model, read, rate, phase, c.frames, false)
         for name, value in pattern.statistics(read.reshape(shape)).items():
-            found[StatisticKey("pattern", c.name, name)] = value
-    return found
+            bank[StatisticKey("pattern", c.name, name)] = value
+    return bank

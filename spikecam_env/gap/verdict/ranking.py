@@ -16,16 +16,16 @@ LEAST_STATED = 0.05
 """Misfit that a candidate removes, from which it is stated with one decimal."""
 
 
-def ranking(rounds: Sequence[Round], found: Sequence[tuple[Fit, Round]], accept: float) -> tuple[Ranked, ...]:
+def ranking(rounds: Sequence[Round], kept_fits: Sequence[tuple[Fit, Round]], accept: float) -> tuple[Ranked, ...]:
     """Every fit of every round: the one that was kept, then the others, the smallest misfit first.
 
     Args:
-        found: fits that were kept, with their rounds.
+        kept_fits: fits that were kept, with their rounds.
         accept: reduction in misfit that an effect has to make.
     """
     rows: list[Ranked] = []
     for turn in rounds:
-        kept = turn.fits[:1] if any(turn is of for _, of in found) else ()
+        kept = turn.fits[:1] if any(turn is of for _, of in kept_fits) else ()
         others = sorted(turn.fits[len(kept) :], key=lambda f: f.misfit)
         rows += [ranked(f, turn, accept, accepted=True) for f in kept]
         rows += [ranked(f, turn, accept, accepted=False) for f in others]

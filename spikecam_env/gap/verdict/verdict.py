@@ -58,25 +58,25 @@ def conclude(comparison: Comparison, rounds: Sequence[Round], floor: float) -> C
     case, null = comparison.case, comparison.null
     last = rounds[-1].start.prediction if rounds else null.prediction
     left = residual(null, comparison.values, last)
-    found = kept(comparison, rounds)
-    by_chance = not rounds or may_be_chance(comparison, found)
+    kept_fits = kept(comparison, rounds)
+    by_chance = not rounds or may_be_chance(comparison, kept_fits)
     explained = Explanation(EXPLAINS_ALL) if by_chance else explanation_of(null, comparison.values, rounds)
     is_clean = explained.degree == EXPLAINS_ALL
     off = parameters_off(comparison, rounds) if is_clean or case.rates_only else {}
-    verdict = verdict_of(comparison, rounds, found, explained.degree) or ("parameter" if off else "none")
+    verdict = verdict_of(comparison, rounds, kept_fits, explained.degree) or ("parameter" if off else "none")
     model = patched_model(comparison, rounds)
     return Conclusion(
         verdict=verdict,
         degree={"named": explained.degree, "class": explained.degree, "unknown": UNKNOWN}.get(verdict),
-        effects=() if verdict == "unknown" else named(comparison, found, explained),
-        stand_ins=tuple(f.name for f, _ in found if verdict == "unknown" or f.name not in explained.names),
-        unknown=described(comparison, found, explained) if verdict == "unknown" else None,
-        class_=tied(found) if verdict == "class" else None,
+        effects=() if verdict == "unknown" else named(comparison, kept_fits, explained),
+        stand_ins=tuple(f.name for f, _ in kept_fits if verdict == "unknown" or f.name not in explained.names),
+        unknown=described(comparison, kept_fits, explained) if verdict == "unknown" else None,
+        class_=tied(kept_fits) if verdict == "class" else None,
         parameters=off,
-        data=(*(c.text for c in comparison.contradictions), *notes_of([r for _, r in found])),
+        data=(*(c.text for c in comparison.contradictions), *notes_of([r for _, r in kept_fits])),
         gap=gap_of(case, null, comparison.values, comparison.given, last, usable_floor(floor)),
         statistics=statistics_rows(comparison, last.mean, left),
-        ranking=ranking(rounds, found, null.settings.deviance.accept),
+        ranking=ranking(rounds, kept_fits, null.settings.deviance.accept),
         not_testable=comparison.not_testable,
         patched=with_strengths(model, off),
         remainder=remainder_of(case, null, comparison.values, last) if verdict == "named" and not is_clean else None,
@@ -86,7 +86,7 @@ def conclude(comparison: Comparison, rounds: Sequence[Round], floor: float) -> C
 def verdict_of(
     comparison: Comparison,
     rounds: Sequence[Round],
-    found: Sequence[tuple[Fit, Round]],
+    kept_fits: Sequence[tuple[Fit, Round]],
     degree: str,
 ) -> str:
     """The verdict on effects; "" if none is missing.
@@ -96,18 +96,18 @@ def verdict_of(
 
     Args:
         comparison: the measurement beside the null model.
-        found: effects that were kept, with their rounds.
+        kept_fits: effects that were kept, with their rounds.
         degree: one of `DEGREES`.
     """
-    enough = found and degree != UNKNOWN and not second_left_out(comparison.case)
+    enough = kept_fits and degree != UNKNOWN and not second_left_out(comparison.case)
     if comparison.contradictions:
         return "data"
-    unexplained = found or degree != EXPLAINS_ALL
-    if rounds and unexplained and not may_be_chance(comparison, found) and not enough:
+    unexplained = kept_fits or degree != EXPLAINS_ALL
+    if rounds and unexplained and not may_be_chance(comparison, kept_fits) and not enough:
         return "unknown"
-    if any(r.rivals for _, r in found) and not comparison.missing:
+    if any(r.rivals for _, r in kept_fits) and not comparison.missing:
         return "class" if degree == EXPLAINS_ALL else "unknown"
-    return "named" if found or comparison.missing else ""
+    return "named" if kept_fits or comparison.missing else ""
 
 
 def parameters_off(comparison: Comparison, rounds: Sequence[Round]) -> dict[str, dict[str, float]]:
@@ -159,9 +159,9 @@ def off_beside(case: Case, tested: SensorModel, last: Hypothesis, unit: BaseFit)
     return off_nominal(case, reduce(SensorModel.with_effect, patterns, tested), unit)
 
 
-def may_be_chance(comparison: Comparison, found: Sequence[tuple[Fit, Round]]) -> bool:
+def may_be_chance(comparison: Comparison, kept_fits: Sequence[tuple[Fit, Round]]) -> bool:
     """Whether nothing was found, and the alarm was a weak one."""
-    return not found and comparison.smallest_p > comparison.null.settings.judging.chance_p
+    return not kept_fits and comparison.smallest_p > comparison.null.settings.judging.chance_p
 
 
 def second_left_out(case: Case) -> bool:
@@ -225,22 +225,22 @@ def with_given_parameters(problem: Problem, tested: SensorModel, rounds: Sequenc
 
 
 def named(
-    comparison: Comparison, found: Sequence[tuple[Fit, Round]], explained: Explanation
+    comparison: Comparison, kept_fits: Sequence[tuple[Fit, Round]], explained: Explanation
 ) -> tuple[NamedEffect, ...]:
     """Effects that the refit found missing, if names are right, and those of the search that have a margin."""
     place, time = where(comparison.case), when(comparison.case)
-    by_search = tuple(named_by_search(comparison, f, r, place, time) for f, r in found if f.name in explained.names)
+    by_search = tuple(named_by_search(comparison, f, r, place, time) for f, r in kept_fits if f.name in explained.names)
     if explained.degree != UNKNOWN:
         return (*(named_by_refit(m) for m in comparison.missing), *by_search)
     return by_search
 
 
-def described(comparison: Comparison, found: Sequence[tuple[Fit, Round]], explained: Explanation) -> dict[str, Any]:
+def described(comparison: Comparison, kept_fits: Sequence[tuple[Fit, Round]], explained: Explanation) -> dict[str, Any]:
     """The structure of an unknown discrepancy, the nearest candidate and its faults, and the search left out."""
     case = comparison.case
     about = structure(case, comparison.null, comparison.residuals)
-    about["best_candidate"] = found[0][0].name if found else None
-    if found:
+    about["best_candidate"] = kept_fits[0][0].name if kept_fits else None
+    if kept_fits:
         about["not_named"] = explained.fault(case.settings.concluding)
     if second_left_out(case):
         about |= {"not_looked_for": SECOND, "effort": enough_effort(case)}
@@ -253,9 +253,9 @@ def enough_effort(case: Case) -> int:
     return 10 * math.ceil((case.budget.simulated / len(case.conditions) + another + 1) / 10)
 
 
-def tied(found: Sequence[tuple[Fit, Round]]) -> dict[str, Any]:
+def tied(kept_fits: Sequence[tuple[Fit, Round]]) -> dict[str, Any]:
     """The candidates of the first tie, and the experiment that separates them."""
-    members = next([f.name, *r.rivals] for f, r in found if r.rivals)
+    members = next([f.name, *r.rivals] for f, r in kept_fits if r.rivals)
     return {"members": members, "experiment": candidate(members[0]).experiment}
 
 
