@@ -18,7 +18,7 @@ from spikecam_env.gap.candidates.table import candidate
 from spikecam_env.gap.compare.distance import effect_size
 from spikecam_env.gap.compare.prediction import Prediction, with_change_scaled
 from spikecam_env.gap.compare.step import likeliest, scale_to, slope_of, step_of
-from spikecam_env.gap.fit.gauss_newton import COMPARED, LONGEST_STEP, MOST_STEPS, SMALL_STEP, UNITS_OF_MAPS
+from spikecam_env.gap.fit.gauss_newton import COMPARED, LONGEST_STEP, MOST_STEPS, SMALL_STEP, UNITS_OF_A_STEP
 from spikecam_env.gap.fit.hypothesis import Fit
 from spikecam_env.gap.fit.problem import Problem
 from spikecam_env.gap.fit.recordings import OF_RANDOM_COURSE, twins_of
@@ -257,7 +257,7 @@ def _fit_maps(problem: Problem, name: str, start: Mapping[str, float]) -> Fit:
     all_of = bounded(name, CATALOGUE[name]().parameters() | dict(start))
     model = with_effect(problem.model, name, all_of)
     own = {key: all_of[key] for key in problem.fitted_parameters(name)}
-    predicted = problem.with_pattern(model, problem.null.prediction, UNITS_OF_MAPS)
+    predicted = problem.with_pattern(model, problem.null.prediction, UNITS_OF_A_STEP)
     return with_fitted_shapes(problem, problem.fit_of(name, own, model, problem.case.base, predicted))
 
 

@@ -57,7 +57,7 @@ WHITE = (UNIT, "white")
 UNIT_STEP = -0.2
 """Step of the logarithm of a unit's parameter to take a derivative by."""
 
-UNITS_OF_MAPS = 4
+UNITS_OF_A_STEP = 4
 """Fresh units of a twin of maps in a descent; a choice: they show their own chance."""
 
 STRENGTH_STEPS = (0.25, 1.0)
@@ -95,7 +95,7 @@ def probe_of(problem: Problem, names: Sequence[str], only: Sequence[int], count:
         count: number of twins.
     """
     maps = problem.case.rates_only
-    draws_units, units = Candidates(tuple(names)).any_pattern or maps, UNITS_OF_MAPS if maps else None
+    draws_units, units = Candidates(tuple(names)).any_pattern or maps, UNITS_OF_A_STEP if maps else None
 
     def statistics(model: SensorModel, base: BaseFit) -> Prediction:
         made = problem.predict(model, constrained_refit(model, base), count, only) if only else problem.null.prediction

@@ -32,7 +32,9 @@ def evidence_of_maps(comparison: Comparison, rounds: Sequence[Round]) -> Evidenc
     case = comparison.case
     nothing = (None,) * len(case.conditions)
     models = [comparison.model, *(r.start.model for r in rounds[-1:])]
-    before, *last = [drawn_response(m, case.base, case.shape, case.seed + case.settings.maps.units) for m in models]
+    before, *last = [
+        drawn_response(m, case.base, case.shape, case.seed + case.settings.twins.drawn_units) for m in models
+    ]
     after = last[0] if last else None
     return Evidence(
         conditions=case.conditions,

@@ -57,6 +57,9 @@ JOIN = 2 * PER_PARAMETER
 """Misfit that a later effect has to remove to earn a joint refit: two parameters without a meaning.  Less than
 `accept`, since earlier effects may have absorbed part of its signature."""
 
+CAMPAIGNS_PER_EFFECT = 16
+"""Cost of another effect, by which the budget allows it; measured: 13 to 25 in four diagnoses."""
+
 SECOND = "a second effect"
 """Without having looked for it, nothing is named where something is left."""
 
@@ -82,7 +85,7 @@ def forward_selection(problem: Problem, names: Sequence[str], templates: Templat
         by_fit = is_discrepant(null, problem.seen) if as_given else not problem.is_explained(now.prediction)
         if not as_given and not by_fit and problem.fitted_to_all.is_explained(now.prediction):
             break
-        cost = settings.searching.campaigns_per_effect * len(problem.case.conditions)
+        cost = CAMPAIGNS_PER_EFFECT * len(problem.case.conditions)
         if rounds and not problem.allows(ANOTHER.get(len(rounds), "another effect"), cost, needed=len(rounds) == 1):
             break
         if not by_fit:

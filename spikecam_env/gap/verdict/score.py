@@ -40,6 +40,10 @@ RULE_OF_THREE = -float(np.log(1.0 - CONFIDENCE))
 """Events expected, 3.0, of which there are none by chance of 1 - CONFIDENCE."""
 
 
+RESOLUTION = 0.6
+"""Least strength that would be refuted, over a simulated bound; a choice, stated on the page."""
+
+
 @dataclass(frozen=True)
 class Score:
     """One number of a campaign that an effect makes larger."""
@@ -117,7 +121,7 @@ class EffectProbe:
     def __init__(self, case: Case, model: SensorModel, null: Null, name: str):
         self.case, self.model, self.null, self.name = case, model, null, name
         self.settings = case.settings
-        self.resolution = case.settings.bounding.resolution
+        self.resolution = RESOLUTION
 
     def events(self, parameters: Parameters) -> float:
         """Expected number of events of an effect of single events, infinite elsewhere."""

@@ -27,7 +27,7 @@ from spikecam_env.gap.result import (
     NamedEffect,
     Statistic,
 )
-from spikecam_env.gap.search.forward import SECOND
+from spikecam_env.gap.search.forward import CAMPAIGNS_PER_EFFECT, SECOND
 from spikecam_env.gap.search.round import Round
 from spikecam_env.gap.twins.case import Case
 from spikecam_env.gap.unit.refit import BaseFit
@@ -249,8 +249,7 @@ def described(comparison: Comparison, kept_fits: Sequence[tuple[Fit, Round]], ex
 
 def enough_effort(case: Case) -> int:
     """Budget with which another effect would have been searched for, in tens."""
-    another = case.settings.searching.campaigns_per_effect
-    return 10 * math.ceil((case.budget.simulated / len(case.conditions) + another + 1) / 10)
+    return 10 * math.ceil((case.budget.simulated / len(case.conditions) + CAMPAIGNS_PER_EFFECT + 1) / 10)
 
 
 def tied(kept_fits: Sequence[tuple[Fit, Round]]) -> dict[str, Any]:
