@@ -22,13 +22,11 @@ from spikecam_env.gap.fit.gauss_newton import PROBES
 from spikecam_env.gap.fit.hypothesis import Fit
 from spikecam_env.gap.fit.joint import (
     is_noisy,
-    no_smaller,
     refined_together,
     simulated_for,
     stepped_once,
     with_unit_fitted,
 )
-from spikecam_env.gap.fit.last_step import Errors
 from spikecam_env.gap.fit.problem import Problem
 from spikecam_env.gap.screen.templates import Templates
 from spikecam_env.gap.search.choice import PER_PARAMETER, chosen_of, confirmed_in_order, margin_of
@@ -41,6 +39,7 @@ from spikecam_env.gap.search.neighbours import (
     try_more_draws,
     try_other_starts,
     try_without_earlier,
+    with_errors,
 )
 from spikecam_env.gap.search.round import (
     Round,
@@ -206,9 +205,3 @@ def may_be_refined(problem: Problem, fit: Fit, names: Sequence[str]) -> bool:
     only, count = simulated_for(problem, fit, names)
     cost = len(only) * (PROBES * count * (1 + len(names)) + problem.settings.twins.in_the_end)
     return problem.allows("finer strengths", cost, needed=True)
-
-
-def with_errors(turn: Round, errors: Errors) -> Round:
-    """The round with its effect's errors from the last joint fit."""
-    best = turn.fits[0]
-    return replace(turn, fits=(replace(best, sd=no_smaller(errors.get(best.name, {}), best.sd)), *turn.fits[1:]))
