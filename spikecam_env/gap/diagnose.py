@@ -25,7 +25,6 @@ from spikecam_env.gap.check.contradiction import Contradiction
 from spikecam_env.gap.check.label_audit import audit
 from spikecam_env.gap.check.static_part import Observed, counted_pixels, without_motion
 from spikecam_env.gap.compare.prediction import values_of
-from spikecam_env.gap.fit.problem import Problem
 from spikecam_env.gap.fit.simulated_templates import own_templates
 from spikecam_env.gap.fit.standard_templates import templates_of
 from spikecam_env.gap.observe.conditions import STEADY_KNOWN, Condition, condition_of
@@ -162,11 +161,7 @@ def of_maps(measured: Campaign, tested: SensorModel, request: DiagnosisRequest, 
     with stages.timed("maps"):
         case = read_maps(measured, request.seed, request.jobs, request.settings.of_maps)
         comparison = comparison_of_maps(case, tested, request.names)
-        rounds: list[Round] = []
-        if comparison.disagrees:
-            problem = Problem.of(case, comparison.model, comparison.null, comparison.values)
-            rounds = forward_selection(problem, comparison.names, None)
-            rounds = up_to_named(case, comparison.null, comparison.values, rounds)
+        rounds = up_to_named(comparison, searched(comparison, None)) if comparison.disagrees else []
         conclusion = conclude(comparison, rounds, CHANCE)
         if rounds:
             conclusion = replace(conclusion, patched=at_measured_dark(case, conclusion.patched))
@@ -215,10 +210,7 @@ def of_spikes(
         with stages.timed("templates"):
             templates = templates or templates_for(comparison, stages.progress)
         with stages.timed("candidates"):
-            problem = Problem.of(case, comparison.model, null, values)
-            rounds = forward_selection(problem, comparison.names, templates)
-            rounds = up_to_named(case, null, values, rounds)
-            rounds = rounds if comparison.missing else with_given_parameters(problem, tested, rounds)
+            rounds = with_given_parameters(comparison, up_to_named(comparison, searched(comparison, templates)))
     with stages.timed("verdict"):
         conclusion = conclude(comparison, rounds, floor_of_halves(case, measured.recordings, null))
     with stages.timed("evidence"):
@@ -243,6 +235,11 @@ def of_spikes(
         simulated=case.budget.simulated,
         motion=motion,
     )
+
+
+def searched(comparison: Comparison, templates: Templates | None) -> list[Round]:
+    """The rounds of a search among the candidates of a comparison; without templates for maps of rates."""
+    return forward_selection(comparison.problem, comparison.names, templates)
 
 
 def read_case(campaign: Campaign, seed: int = 0, jobs: int = 1, settings: DiagnosisSettings | None = None) -> Case:

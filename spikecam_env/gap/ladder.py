@@ -21,15 +21,13 @@ from spikecam_env.gap.baseline.missing_from_refit import Missing
 from spikecam_env.gap.baseline.null_model import model_null
 from spikecam_env.gap.candidates.table import chosen
 from spikecam_env.gap.compare.distance import adjusted
-from spikecam_env.gap.diagnose import DiagnosisRequest, comparison_of, read_case
+from spikecam_env.gap.diagnose import DiagnosisRequest, comparison_of, read_case, searched
 from spikecam_env.gap.fit.hypothesis import Fit, Hypothesis
-from spikecam_env.gap.fit.problem import Problem
 from spikecam_env.gap.fit.standard_templates import templates_of
 from spikecam_env.gap.report import plots
 from spikecam_env.gap.report.quantities import quantity
 from spikecam_env.gap.report.words import human, parameter_unit
 from spikecam_env.gap.result import SIGNIFICANT
-from spikecam_env.gap.search.forward import forward_selection
 from spikecam_env.gap.search.round import adding
 from spikecam_env.gap.stages import Stages
 from spikecam_env.gap.twins.workers import sums_in_one_order
@@ -180,8 +178,7 @@ def search_steps(comparison: Comparison) -> list[tuple[SensorModel, Floats, Miss
     """Models of a search with their predictions (S,) and newest effects, where the null model still differs."""
     if not comparison.disagrees:
         return []
-    problem = Problem.of(comparison.case, comparison.model, comparison.null, comparison.values)
-    rounds = forward_selection(problem, comparison.names, templates_of(comparison.names, jobs=comparison.case.jobs))
+    rounds = searched(comparison, templates_of(comparison.names, jobs=comparison.case.jobs))
     return [
         (end.start.model, end.start.prediction.mean, as_missing(turn.fits[0], end.start))
         for turn, end in adding(rounds)

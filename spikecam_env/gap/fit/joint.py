@@ -14,8 +14,7 @@ from spikecam_env.gap.fit.coordinates import is_apart
 from spikecam_env.gap.fit.gauss_newton import WHITE, Probe, descend, probe_of, spreads_of
 from spikecam_env.gap.fit.hypothesis import Fit, Hypothesis
 from spikecam_env.gap.fit.last_step import Errors, Slopes, last_step
-from spikecam_env.gap.fit.problem import Problem
-from spikecam_env.gap.fit.recordings import twins_of, with_held_out
+from spikecam_env.gap.fit.problem import Problem, twins_of, with_held_out
 from spikecam_env.gap.unit.refit import BaseFit, constrained_refit
 from spikecam_env.types import Floats
 

@@ -25,11 +25,10 @@ from spikecam_env.gap.candidates.strength import MOST_EXTRAPOLATED, bounded, wit
 from spikecam_env.gap.candidates.table import LACKING, candidate
 from spikecam_env.gap.compare.prediction import with_change_scaled
 from spikecam_env.gap.compare.step import scale_to
-from spikecam_env.gap.fit.candidate import LARGEST_FACTOR, ROUND_OFF
+from spikecam_env.gap.fit.candidate import LARGEST_FACTOR, ROUND_OFF, where_ended
 from spikecam_env.gap.fit.gauss_newton import COMPARED, MOST_STEPS, descend, probe_of
 from spikecam_env.gap.fit.hypothesis import Fit
 from spikecam_env.gap.fit.problem import Problem
-from spikecam_env.gap.fit.shapes import where_ended
 from spikecam_env.gap.search.round import Round
 from spikecam_env.gap.unit.indirect_inference import extrapolated_unit
 from spikecam_env.gap.unit.refit import constrained_refit

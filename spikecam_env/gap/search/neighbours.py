@@ -21,13 +21,12 @@ import numpy as np
 
 from spikecam_env.gap.candidates.table import candidate
 from spikecam_env.gap.compare.distance import is_significant, residual
-from spikecam_env.gap.fit.candidate import fit
+from spikecam_env.gap.fit.candidate import WORTH, fit, with_fitted_shapes
 from spikecam_env.gap.fit.confirm import confirmed, no_more_certain, resettled, with_prediction
 from spikecam_env.gap.fit.hypothesis import Fit
 from spikecam_env.gap.fit.joint import no_smaller, refined_together
 from spikecam_env.gap.fit.last_step import Errors
 from spikecam_env.gap.fit.problem import Problem
-from spikecam_env.gap.fit.shapes import WORTH, with_fitted_shapes
 from spikecam_env.gap.screen.screen import Screened
 from spikecam_env.gap.search.choice import chosen_of, confirmed_in_order, margin_of
 from spikecam_env.gap.search.joint_start import CANCELLING, fit_cancelling_pair, one_by_one

@@ -11,8 +11,8 @@ import numpy as np
 from spikecam_env.gap.candidates.table import candidate, expected_events
 from spikecam_env.gap.compare.distance import is_significant
 from spikecam_env.gap.compare.prediction import Null
+from spikecam_env.gap.fit.candidate import WORTH
 from spikecam_env.gap.fit.hypothesis import Fit, Hypothesis
-from spikecam_env.gap.fit.shapes import WORTH
 from spikecam_env.gap.settings import Deviance
 from spikecam_env.gap.twins.case import Case
 from spikecam_env.sensor import SensorModel

@@ -11,11 +11,9 @@ import numpy as np
 from spikecam_env.gap.candidates.table import acting_through, candidate
 from spikecam_env.gap.compare.distance import SHOWS
 from spikecam_env.gap.compare.prediction import Null
-from spikecam_env.gap.fit.candidate import fit
+from spikecam_env.gap.fit.candidate import WORTH, fit, with_fitted_shapes, with_shapes_to_fit
 from spikecam_env.gap.fit.hypothesis import Fit
-from spikecam_env.gap.fit.problem import Problem
-from spikecam_env.gap.fit.recordings import twins_of
-from spikecam_env.gap.fit.shapes import WORTH, with_fitted_shapes, with_shapes_to_fit
+from spikecam_env.gap.fit.problem import Problem, twins_of
 from spikecam_env.gap.fit.simulated_templates import own_templates
 from spikecam_env.gap.screen.screen import Screened, screen
 from spikecam_env.gap.screen.templates import Templates

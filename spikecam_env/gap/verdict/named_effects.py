@@ -14,8 +14,7 @@ from spikecam_env.gap.fit.coordinates import interval_of
 from spikecam_env.gap.fit.hypothesis import Fit
 from spikecam_env.gap.result import Estimate, NamedEffect
 from spikecam_env.gap.search.round import Round, absent, adding
-from spikecam_env.gap.verdict.comparison import Comparison
-from spikecam_env.gap.verdict.gap import gap_of
+from spikecam_env.gap.verdict.comparison import Comparison, gap_of
 from spikecam_env.sensor import SensorModel
 
 MOST_CONFIDENCE = 0.99

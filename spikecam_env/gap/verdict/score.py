@@ -24,7 +24,7 @@ from spikecam_env.gap.compare.step import is_clear
 from spikecam_env.gap.fit.candidate import MOST_TRIES
 from spikecam_env.gap.fit.gauss_newton import at_settled_unit
 from spikecam_env.gap.fit.predict import predict_by_twins, with_drawn_pattern
-from spikecam_env.gap.fit.recordings import OF_RANDOM_COURSE, recordings_affected, twins_of
+from spikecam_env.gap.fit.problem import OF_RANDOM_COURSE, recordings_affected, twins_of
 from spikecam_env.gap.twins.case import Case
 from spikecam_env.gap.unit.indirect_inference import extrapolated_unit
 from spikecam_env.gap.unit.refit import BaseFit, constrained_refit

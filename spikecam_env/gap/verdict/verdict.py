@@ -13,11 +13,9 @@ import numpy as np
 from spikecam_env.gap.baseline.off_nominal import OffNominal, off_nominal, spreads_off, with_strengths
 from spikecam_env.gap.candidates.table import candidate
 from spikecam_env.gap.compare.distance import adjusted, deviates, residual
-from spikecam_env.gap.compare.prediction import Null
+from spikecam_env.gap.fit.candidate import WORTH
 from spikecam_env.gap.fit.confirm import confirmed
 from spikecam_env.gap.fit.hypothesis import Fit, Hypothesis
-from spikecam_env.gap.fit.problem import Problem
-from spikecam_env.gap.fit.shapes import WORTH
 from spikecam_env.gap.result import (
     EXPLAINS_ALL,
     EXPLAINS_NEARLY_ALL,
@@ -26,16 +24,15 @@ from spikecam_env.gap.result import (
     Conclusion,
     NamedEffect,
     Statistic,
+    notes_of,
 )
 from spikecam_env.gap.search.forward import CAMPAIGNS_PER_EFFECT, SECOND
 from spikecam_env.gap.search.round import Round
 from spikecam_env.gap.twins.case import Case
 from spikecam_env.gap.unit.refit import BaseFit
-from spikecam_env.gap.verdict.comparison import Comparison
+from spikecam_env.gap.verdict.comparison import Comparison, gap_of, usable_floor
 from spikecam_env.gap.verdict.degree import Explanation, explanation_of
-from spikecam_env.gap.verdict.gap import gap_of, usable_floor
 from spikecam_env.gap.verdict.named_effects import kept, named_by_refit, named_by_search, patched_model
-from spikecam_env.gap.verdict.notes import notes_of
 from spikecam_env.gap.verdict.ranking import ranking
 from spikecam_env.gap.verdict.remainder import remainder_of, squares_left
 from spikecam_env.gap.verdict.structure import structure
@@ -169,17 +166,15 @@ def second_left_out(case: Case) -> bool:
     return SECOND in case.budget.left_out
 
 
-def up_to_named(case: Case, null: Null, values: Floats, rounds: Sequence[Round]) -> list[Round]:
+def up_to_named(comparison: Comparison, rounds: Sequence[Round]) -> list[Round]:
     """The rounds up to the one whose effects are named.
 
     That is the last of those that explain all or nearly all and take most of the earlier remainder: a round that takes
     less stands for details of the earlier law.  Otherwise it is the one with most names that are shown to be right,
     and fewest others.  If there is none either, the rounds end at the smallest held-out gap: an empirical patch has to
     be of use in recordings that took no part.
-
-    Args:
-        values: (S,) measured statistics.
     """
+    case, null, values = comparison.case, comparison.null, comparison.values
     *before, last = rounds
     ends = [(r, explanation_of(null, values, rounds[: n + 1])) for n, r in enumerate(rounds) if n > 0]
     explaining = [r for r, made in ends if made.degree in NEARLY]
@@ -197,19 +192,20 @@ def up_to_named(case: Case, null: Null, values: Floats, rounds: Sequence[Round])
     return list(rounds) if end is last else [*before, replace(end, fits=())]
 
 
-def with_given_parameters(problem: Problem, tested: SensorModel, rounds: Sequence[Round]) -> list[Round]:
+def with_given_parameters(comparison: Comparison, rounds: Sequence[Round]) -> list[Round]:
     """The rounds with the tested model's nominal parameters in the last unit, where these explain the data as well.
 
     The fitted ones stay where they take more than half of the nominal ones' remainder.  An effect whose law differs in
     details moves the statistics by which a parameter is known.
-
-    Args:
-        problem: the problem of the null model.
-        tested: the model under test.
     """
     *before, end = rounds
+    problem, tested = comparison.problem, comparison.tested
     null, values, last = problem.null, problem.values, end.start
-    if last.effects <= {e.name for e in tested.effects} or explanation_of(null, values, rounds).degree not in NEARLY:
+    if (
+        comparison.missing
+        or last.effects <= {e.name for e in tested.effects}
+        or explanation_of(null, values, rounds).degree not in NEARLY
+    ):
         return list(rounds)
     off = off_beside(problem.case, tested, last, last.base)
     count = problem.settings.twins.in_the_end
