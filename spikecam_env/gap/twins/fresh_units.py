@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from spikecam_env.gap.observe.conditions import Condition
-from spikecam_env.gap.statistics import StatisticKey, pattern
+from spikecam_env.gap.statistics import StatisticKey, keyed, pattern
 from spikecam_env.gap.unit.false_spikes import read_with_false_spikes
 from spikecam_env.gap.unit.refit import BaseFit, responds
 from spikecam_env.gap.unit.traps import drawn_traps, trap_level
@@ -109,7 +109,7 @@ def _pattern_statistics(
     gain, dark = drawn_response(model, base, shape, seed)
     charge = drawn_traps(model, shape, seed)
     rng, phases, false = (np.random.default_rng([seed, n]) for n in (1, 2, 3))
-    bank = {}
+    bank: dict[StatisticKey, float] = {}
     for c in shown:
         if c.kind not in ("dark", "flat") or c.light is None:
             continue
@@ -121,6 +121,5 @@ def _pattern_statistics(
         read = np.clip(rate * (1.0 + noise * rng.standard_normal(rate.size)), 0.0, 1.0)
         read = np.where(count > 1, read, count / c.frames)  # as `ObservedRecording.rate`: one spike has no interval
         read = read_with_false_spikes(model, read, rate, phase, c.frames, false)
-        for name, value in pattern.statistics(read.reshape(shape)).items():
-            bank[StatisticKey("pattern", c.name, name)] = value
+        bank |= keyed("pattern", c.name, pattern.statistics(read.reshape(shape)))
     return bank

@@ -16,7 +16,7 @@ from spikecam_env.campaign.reading import Campaign
 from spikecam_env.errors import InputError
 from spikecam_env.gap.observe.conditions import STEADY_KNOWN, Condition, condition_of
 from spikecam_env.gap.settings import DiagnosisSettings
-from spikecam_env.gap.statistics import StatisticKey, pattern, texture
+from spikecam_env.gap.statistics import StatisticKey, keyed, pattern, texture
 from spikecam_env.gap.twins.case import Case
 from spikecam_env.gap.twins.fresh_units import SPREAD_PARAMETERS, drawn_response, with_spreads_scaled
 from spikecam_env.gap.unit.refit import BaseFit, responds
@@ -119,14 +119,12 @@ def dark_of(conditions: Sequence[Condition], rates: Mapping[str, Floats]) -> Flo
 def map_bank(conditions: Sequence[Condition], rates: Mapping[str, Floats]) -> dict[StatisticKey, float]:
     """Statistics of every map; texture of lit ones less the dark."""
     dark = dark_of(conditions, rates)
-    statistics = {}
+    bank: dict[StatisticKey, float] = {}
     for c in conditions:
         rate = rates[c.name]
         own = rate if c.kind == "dark" or dark is None else rate - dark
-        for group, values in (("pattern", pattern.statistics(rate)), ("texture", texture.statistics(own))):
-            for name, value in values.items():
-                statistics[StatisticKey(group, c.name, name)] = value
-    return statistics
+        bank |= keyed("pattern", c.name, pattern.statistics(rate)) | keyed("texture", c.name, texture.statistics(own))
+    return bank
 
 
 def with_spreads_matched(case: MapCase, model: SensorModel) -> SensorModel:
