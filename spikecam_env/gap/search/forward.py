@@ -43,11 +43,9 @@ from spikecam_env.gap.search.neighbours import (
 )
 from spikecam_env.gap.search.round import (
     Round,
-    absent,
     has_candidate,
     is_improvement,
-    is_second_bend,
-    is_small_share,
+    is_stand_in,
     is_visible,
 )
 from spikecam_env.gap.search.shortlist import fits_of, groups_that_stand_out, screened_beside, starts_to_fit
@@ -77,7 +75,7 @@ def forward_selection(problem: Problem, names: Sequence[str], templates: Templat
         The rounds that added an effect, and a last one with the final model.
     """
     rounds: list[Round] = []
-    given, null, settings = problem, problem.null, problem.settings
+    given, null, settings = problem.case, problem.null, problem.settings
     now = with_unit_fitted(problem)
     while len(rounds) < settings.searching.most_effects:
         as_given = now.model is problem.model
@@ -91,7 +89,7 @@ def forward_selection(problem: Problem, names: Sequence[str], templates: Templat
             problem = Problem.of(with_held_out_motion(problem.case), problem.model, null, problem.values)
         chance = float(np.sum(null.weight * np.isfinite(problem.seen)))
         here = problem.standing_on(now)
-        motion_alone = problem.case is not given.case
+        motion_alone = problem.case is not given
         to_join = JOIN if rounds else settings.deviance.accept
         turn = Round(replace(now, misfit=here.misfit()), motion_alone=motion_alone, to_join=to_join)
         turn = with_candidates(problem, here, names, templates, turn)
@@ -101,10 +99,7 @@ def forward_selection(problem: Problem, names: Sequence[str], templates: Templat
         rounds[-1:] = one_by_one(turn)
         together = joined(problem, rounds, chance)
         best = together[-1].fits[0]
-        weak = turn.start.misfit - turn.fits[0].misfit < settings.deviance.accept
-        if not is_improvement(null, problem.misfit(now.prediction), best, len(rounds) > 1, weak):
-            break
-        if best.name in absent(problem.case, given.model, best.model):
+        if not is_improvement(problem, problem.misfit(now.prediction), turn, best, len(rounds) > 1):
             break
         rounds = together
         prediction = best.prediction
@@ -182,22 +177,6 @@ def joined(problem: Problem, rounds: Sequence[Round], chance: float) -> list[Rou
     if before and is_significant(problem.null, best.rho, best.prediction):
         last, errors = try_in_place_of_last(problem, last, errors, names)
     return [with_errors(r, errors) for r in (*before, last)]
-
-
-def is_stand_in(problem: Problem, last: Round, best: Fit, chance: float, later: bool) -> bool:
-    """Whether the first effect, or a second bend, removes little and leaves something: it may stand for another.
-
-    Args:
-        problem: the model as given.
-        last: the effect's round.
-        best: its fit.
-        chance: misfit of noise alone.
-        later: whether there are effects before it.
-    """
-    if later and not is_second_bend(last, best):
-        return False
-    little = is_small_share(last, best.misfit, chance, later)
-    return little and is_significant(problem.null, best.rho, best.prediction)
 
 
 def may_be_refined(problem: Problem, fit: Fit, names: Sequence[str]) -> bool:
