@@ -36,8 +36,13 @@ from spikecam_env.gap.fit.hypothesis import Fit
 from spikecam_env.gap.fit.problem import OF_RANDOM_COURSE, Problem, twins_of
 from spikecam_env.gap.unit.indirect_inference import extrapolated_unit, has_converged
 from spikecam_env.gap.unit.refit import BaseFit, constrained_refit
-from spikecam_env.sensor import CATALOGUE
 from spikecam_env.types import Floats
+
+STARTS_OF_MAPS = (0.1, 1.0, 10.0)
+"""Factors of a strength from which a pattern is fitted in maps of rates; a choice: one is within a factor of 3."""
+
+WORTH = 0.5
+"""Of what the best removes: less is not worth another fit, of a start, a shape, or a runner-up of an earlier effect."""
 
 VISIBLE = 4.0
 """Least size of a simulated effect [noises] from which its strength is scaled."""
@@ -264,12 +269,10 @@ def _fit_random_course(problem: Problem, name: str, parameters: dict[str, float]
 
 
 def _fit_maps(problem: Problem, name: str, start: Mapping[str, float]) -> Fit:
-    """All parameters of a pattern, with the spreads of the unit, by maps of rates."""
-    all_of = bounded(name, CATALOGUE[name]().parameters() | dict(start))
-    model = with_effect(problem.model, name, all_of)
-    own = {key: all_of[key] for key in problem.fitted_parameters(name)}
-    predicted = problem.with_pattern(model, problem.null.prediction, UNITS_OF_A_STEP)
-    return with_fitted_shapes(problem, problem.fit_of(name, own, model, problem.case.base, predicted))
+    """All parameters of a pattern, with the spreads of the unit, by maps of rates: from the best of three strengths."""
+    own = {key: start[key] for key in problem.fitted_parameters(name)}
+    tried = [_of_pattern(problem, name, own, candidate(name).strength, f, UNITS_OF_A_STEP) for f in STARTS_OF_MAPS]
+    return with_fitted_shapes(problem, min(tried, key=lambda f: f.misfit))
 
 
 def _fit_pattern(problem: Problem, name: str, start: Mapping[str, float]) -> Fit:
@@ -280,17 +283,20 @@ def _fit_pattern(problem: Problem, name: str, start: Mapping[str, float]) -> Fit
         for key in candidate(name).fitted:
             centre = best.parameters if best else parameters
             for factor in factors:
-                tried = bounded(name, {**centre, key: centre[key] * factor})
-                model = with_effect(problem.model, name, tried)
-                predicted = problem.with_pattern(model, problem.null.prediction)
-                now = problem.fit_of(name, tried, model, constrained_refit(model, problem.case.base), predicted)
+                now = _of_pattern(problem, name, centre, key, factor)
                 best = now if best is None or now.misfit < best.misfit else best
     assert best is not None
     return best
 
 
-WORTH = 0.5
-"""Of what the best removes: less is not worth another fit, of a start, a shape, or a runner-up of an earlier effect."""
+def _of_pattern(
+    problem: Problem, name: str, parameters: Mapping[str, float], key: str, factor: float, units: int | None = None
+) -> Fit:
+    """A pattern with one of its parameters multiplied, by so many drawn units; None: as many as the null has."""
+    tried = bounded(name, {**parameters, key: parameters[key] * factor})
+    model = with_effect(problem.model, name, tried)
+    predicted = problem.with_pattern(model, problem.null.prediction, units)
+    return problem.fit_of(name, tried, model, constrained_refit(model, problem.case.base), predicted)
 
 
 def with_shapes_to_fit(problem: Problem, before: float, fits: Sequence[Fit]) -> list[Fit]:

@@ -25,6 +25,15 @@ from spikecam_env.types import Floats
 CENTRE = ("centre_x", "centre_y")
 """Parameters that maps of rates show, and a refit of single pixels takes for their own response."""
 
+OF_EVENTS = 3
+"""Twins of a sparse or mixed effect."""
+
+SPARSE_OR_MIXED = (Response.EVENTS, Response.FEW_PIXELS, Response.MIXED)
+"""Responses of which one simulation says little, and a stronger effect no more."""
+
+OF_RANDOM_COURSE = 2 * OF_EVENTS
+"""Twins of an effect of random course: their scatter counts."""
+
 
 @dataclass(frozen=True, eq=False)
 class Problem:
@@ -136,16 +145,6 @@ def standing_on(null: Null, predicted: Prediction) -> Null:
     floor = np.sqrt(null.floor**2 + law_error(null, predicted) ** 2 + own_variance(null, predicted))
     freedom = freedom_of(null, predicted)
     return replace(null, mean=predicted.mean, sd=predicted.spread, floor=floor, freedom=freedom, draws=predicted.draws)
-
-
-OF_EVENTS = 3
-"""Twins of a sparse or mixed effect."""
-
-SPARSE_OR_MIXED = (Response.EVENTS, Response.FEW_PIXELS, Response.MIXED)
-"""Responses of which one simulation says little, and a stronger effect no more."""
-
-OF_RANDOM_COURSE = 2 * OF_EVENTS
-"""Twins of an effect of random course: their scatter counts."""
 
 
 def twins_of(name: str) -> int:

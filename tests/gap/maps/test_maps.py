@@ -90,6 +90,14 @@ def test_shading_is_named_in_maps_of_a_thousand_pixels(tmp_path: Path) -> None:
     assert found.effects[0].parameters["falloff"].value == pytest.approx(0.3, abs=0.08)
 
 
+def test_the_centre_of_shading_is_found_where_the_lens_is_off_the_middle(tmp_path: Path) -> None:
+    folder = campaign_of(tmp_path / "maps", effect("vignetting", falloff=0.4, centre_x=0.65, centre_y=0.3))
+    found = diagnose(folder, "scsim", candidates=("vignetting",), progress=False)
+    values = {name: p.value for name, p in found.effects[0].parameters.items()}
+    print(values)
+    assert (values["centre_x"], values["centre_y"]) == pytest.approx((0.65, 0.3), abs=0.05)
+
+
 def test_rates_of_unknown_light_alone_say_nothing(tmp_path: Path) -> None:
     folder = campaign_of(tmp_path / "maps")
     about = json.loads((folder / "campaign.json").read_text())
