@@ -17,23 +17,21 @@ from spikecam_env.campaign.reading import Campaign, read_campaign
 from spikecam_env.errors import InputError, unknown_name
 from spikecam_env.gap.baseline.halves_floor import floor_of_halves
 from spikecam_env.gap.baseline.missing_from_refit import missing_effects, with_missing
-from spikecam_env.gap.baseline.null_model import model_null
+from spikecam_env.gap.baseline.null_model import maps_null, model_null
 from spikecam_env.gap.baseline.off_nominal import OffNominal, off_nominal
 from spikecam_env.gap.baseline.upheld_labels import upheld
-from spikecam_env.gap.candidates.table import chosen, testable
+from spikecam_env.gap.candidates.table import candidate, chosen, testable
 from spikecam_env.gap.check.contradiction import Contradiction
 from spikecam_env.gap.check.label_audit import audit
 from spikecam_env.gap.check.static_part import Observed, counted_pixels, without_motion
 from spikecam_env.gap.compare.prediction import values_of
-from spikecam_env.gap.fit.problem import Problem
 from spikecam_env.gap.fit.simulated_templates import own_templates
 from spikecam_env.gap.fit.standard_templates import templates_of
-from spikecam_env.gap.maps import diagnose_maps
 from spikecam_env.gap.observe.conditions import STEADY_KNOWN, Condition, condition_of
 from spikecam_env.gap.observe.observation import observe
-from spikecam_env.gap.report.evidence import evidence_for
+from spikecam_env.gap.report.evidence import evidence_for, evidence_of_maps
 from spikecam_env.gap.report.sentence import BOUNDS_OF_MAPS, sentence, unbounded, unfinished
-from spikecam_env.gap.result import BOUND_KINDS, BOUNDED_VERDICTS, Bound, Conclusion, Diagnosis, Findings
+from spikecam_env.gap.result import BOUND_KINDS, BOUNDED_VERDICTS, CHANCE, Bound, Conclusion, Diagnosis, Findings
 from spikecam_env.gap.screen.templates import Templates, shipped_templates
 from spikecam_env.gap.search.forward import forward_selection
 from spikecam_env.gap.search.round import Round
@@ -41,6 +39,7 @@ from spikecam_env.gap.settings import DiagnosisSettings, checked_settings
 from spikecam_env.gap.stages import Stages
 from spikecam_env.gap.twins.budget import CAMPAIGNS, Budget
 from spikecam_env.gap.twins.case import Case, case_of
+from spikecam_env.gap.twins.rate_maps import MapCase, at_measured_dark, read_maps, with_spreads_matched
 from spikecam_env.gap.twins.workers import sums_in_one_order
 from spikecam_env.gap.unit.label_unit import in_nominal_units, label_unit_note, nominal_per_label
 from spikecam_env.gap.verdict.bounds import bounds as upper_bounds
@@ -50,6 +49,9 @@ from spikecam_env.gap.verdict.verdict import conclude, up_to_named, with_given_p
 from spikecam_env.numbers import Range
 from spikecam_env.sensor import SensorModel
 from spikecam_env.sensor.own_effects import files_of
+
+SPIKES_NEEDED = "spikes: rates say nothing of when they come"
+"""Needed for all candidates but patterns."""
 
 
 @sums_in_one_order
@@ -111,14 +113,12 @@ def diagnose(
     tested = model if isinstance(model, SensorModel) else SensorModel.load(model)
     tested = replace(tested, frame_rate_hz=measured.frame_rate_hz)
     names = chosen(tested, candidates, exclude)
-    if any(r.spikes for r in measured.recordings):
-        request = DiagnosisRequest(tuple(names), seed, jobs, effort, twin_count, static_only, settings, bounds)
-        with stages.shown(effort):
+    request = DiagnosisRequest(tuple(names), seed, jobs, effort, twin_count, static_only, settings, bounds)
+    with stages.shown(effort):
+        if any(r.spikes for r in measured.recordings):
             findings = of_spikes(measured, tested, request, templates, stages)
-    else:
-        with stages.timed("maps"):
-            conclusion, evidence = diagnose_maps(measured, tested, names, seed, jobs, settings)
-            findings = findings_of(conclusion, [BOUNDS_OF_MAPS] if bounds == "simulated" else [], evidence=evidence)
+        else:
+            findings = of_maps(measured, tested, request, stages)
     model_name = tested.name if isinstance(model, SensorModel) else str(model)
     return Diagnosis(
         **vars(findings),
@@ -156,6 +156,40 @@ class DiagnosisRequest:
     bounds: str = "linear"
 
 
+def of_maps(measured: Campaign, tested: SensorModel, request: DiagnosisRequest, stages: Stages) -> Findings:
+    """A campaign of rates only, from its files to the findings: its twins are fresh units."""
+    with stages.timed("maps"):
+        case = read_maps(measured, request.seed, request.jobs, request.settings.of_maps)
+        comparison = comparison_of_maps(case, tested, request.names)
+        rounds = up_to_named(comparison, searched(comparison, None)) if comparison.disagrees else []
+        conclusion = conclude(comparison, rounds, CHANCE)
+        if rounds:
+            conclusion = replace(conclusion, patched=at_measured_dark(case, conclusion.patched))
+        evidence = evidence_of_maps(comparison, rounds)
+    return findings_of(conclusion, [BOUNDS_OF_MAPS] if request.bounds == "simulated" else [], evidence=evidence)
+
+
+def comparison_of_maps(case: MapCase, tested: SensorModel, names: Sequence[str]) -> Comparison:
+    """Maps of rates beside a model whose spreads are those of the unit, as far as units differ."""
+    model = with_spreads_matched(case, tested)
+    null = maps_null(case, model)
+    by_spikes = [name for name in names if not candidate(name).is_pattern]
+    shown, not_shown = testable([name for name in names if name not in by_spikes], case.conditions)
+    return Comparison(
+        case=case,
+        tested=tested,
+        model=model,
+        null=null,
+        values=values_of(case.bank, null.keys),
+        given=null.mean,
+        missing=(),
+        off=OffNominal({}, case.base),
+        contradictions=(),
+        names=tuple(shown),
+        not_testable=(*((name, SPIKES_NEEDED) for name in by_spikes), *not_shown),
+    )
+
+
 def of_spikes(
     measured: Campaign, tested: SensorModel, request: DiagnosisRequest, templates: Templates | None, stages: Stages
 ) -> Findings:
@@ -176,10 +210,7 @@ def of_spikes(
         with stages.timed("templates"):
             templates = templates or templates_for(comparison, stages.progress)
         with stages.timed("candidates"):
-            problem = Problem.of(case, comparison.model, null, values)
-            rounds = forward_selection(problem, comparison.names, templates)
-            rounds = up_to_named(case, null, values, rounds)
-            rounds = rounds if comparison.missing else with_given_parameters(problem, tested, rounds)
+            rounds = with_given_parameters(comparison, up_to_named(comparison, searched(comparison, templates)))
     with stages.timed("verdict"):
         conclusion = conclude(comparison, rounds, floor_of_halves(case, measured.recordings, null))
     with stages.timed("evidence"):
@@ -204,6 +235,11 @@ def of_spikes(
         simulated=case.budget.simulated,
         motion=motion,
     )
+
+
+def searched(comparison: Comparison, templates: Templates | None) -> list[Round]:
+    """The rounds of a search among the candidates of a comparison; without templates for maps of rates."""
+    return forward_selection(comparison.problem, comparison.names, templates)
 
 
 def read_case(campaign: Campaign, seed: int = 0, jobs: int = 1, settings: DiagnosisSettings | None = None) -> Case:

@@ -7,36 +7,32 @@ held-out statistics, in the noise of the last.
 
 from __future__ import annotations
 
-import itertools
 import json
-from collections.abc import Sequence
+import math
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from matplotlib.figure import Figure
-from tqdm import tqdm
 
 from spikecam_env.campaign.reading import Campaign, read_campaign
-from spikecam_env.gap.baseline.alarm import is_discrepant
-from spikecam_env.gap.baseline.missing_from_refit import Missing, missing_effects, with_missing
+from spikecam_env.gap.baseline.missing_from_refit import Missing
 from spikecam_env.gap.baseline.null_model import model_null
-from spikecam_env.gap.candidates.table import chosen, testable
+from spikecam_env.gap.candidates.table import chosen
 from spikecam_env.gap.compare.distance import adjusted
-from spikecam_env.gap.compare.prediction import Null, values_of
-from spikecam_env.gap.diagnose import read_case
-from spikecam_env.gap.fit.problem import Problem, values_to_fit
+from spikecam_env.gap.diagnose import DiagnosisRequest, comparison_of, read_case, searched
+from spikecam_env.gap.fit.hypothesis import Fit, Hypothesis
 from spikecam_env.gap.fit.standard_templates import templates_of
 from spikecam_env.gap.report import plots
 from spikecam_env.gap.report.quantities import quantity
 from spikecam_env.gap.report.words import human, parameter_unit
 from spikecam_env.gap.result import SIGNIFICANT
-from spikecam_env.gap.search.forward import forward_selection
-from spikecam_env.gap.twins.case import Case
+from spikecam_env.gap.search.round import adding
+from spikecam_env.gap.stages import Stages
 from spikecam_env.gap.twins.workers import sums_in_one_order
 from spikecam_env.gap.unit.label_unit import label_unit_note
-from spikecam_env.gap.verdict.comparison import aligned_mean
+from spikecam_env.gap.verdict.comparison import Comparison, aligned_mean
 from spikecam_env.sensor import Effect, SensorModel
 from spikecam_env.types import Floats
 from spikecam_env.whole import whole_folder, write_text_whole
@@ -136,82 +132,63 @@ def ladder(
     """
     measured = campaign if isinstance(campaign, Campaign) else read_campaign(campaign)
     first = model if isinstance(model, SensorModel) else SensorModel.load(model)
-    case = read_case(measured, seed, jobs)
-    names, _ = testable(chosen(first, None, ()), case.conditions)
-    lacking = missing_effects(case, first, names)
-    null = model_null(case, with_missing(first, lacking), twin_count)
-    judge = RungStatistics(case, null, values_of(case.bank, null.keys))
-    rungs = climbed(judge, first, lacking, progress)
-    rungs += searched(judge, with_missing(first, lacking), names)
+    case, stages = read_case(measured, seed, jobs), Stages(progress)
+    request = DiagnosisRequest(tuple(chosen(first, None, ())), seed, jobs, math.inf, twin_count)
+    comparison = comparison_of(case, first, request, stages)
+    with stages.timed("rungs"):
+        rungs = climbed(comparison)
+    with stages.timed("candidates"):
+        rungs += [rung_of(comparison, *step) for step in search_steps(comparison)]
     notes = tuple(label_unit_note(case.nominal_per_label, case.base))
-    return Ladder(str(measured.folder), seed, len(judge.values), tuple(rungs), notes)
+    return Ladder(str(measured.folder), seed, len(comparison.values), tuple(rungs), notes)
 
 
-@dataclass(frozen=True)
-class RungStatistics:
-    """The statistics by which all rungs are judged, in the noise of the last model."""
-
-    case: Case
-    null: Null
-    values: Floats
-    """(S,) as measured."""
-
-    def rung(self, model: SensorModel, mean: Floats, newest: Missing | None) -> Rung:
-        """A model as a rung, with its predictions (S,) and its newest effect."""
-        square = np.nan_to_num((self.values - mean) / self.null.noise) ** 2
-        group = np.array([k.group for k in self.null.keys])
-        p = adjusted(np.sign(self.values - mean) * np.sqrt(square))
-        return Rung(
-            model,
-            newest.effect if newest else None,
-            newest.sd if newest else np.nan,
-            newest.also if newest else (),
-            float(square[self.case.held_out(self.null.keys)].mean()),
-            {g: float(square[group == g].mean()) for g in dict.fromkeys(group.tolist())},
-            int((p < SIGNIFICANT).sum()),
-        )
+def rung_of(comparison: Comparison, model: SensorModel, mean: Floats, newest: Missing | None) -> Rung:
+    """A model as a rung, with its predictions (S,) and its newest effect: judged in the noise of the null model."""
+    null, off = comparison.null, comparison.values - mean
+    square = np.nan_to_num(off / null.noise) ** 2
+    group = np.array([k.group for k in null.keys])
+    return Rung(
+        model,
+        newest.effect if newest else None,
+        newest.sd if newest else np.nan,
+        newest.also if newest else (),
+        float(square[comparison.case.held_out(null.keys)].mean()),
+        {g: float(square[group == g].mean()) for g in dict.fromkeys(group.tolist())},
+        int((adjusted(np.sign(off) * np.sqrt(square)) < SIGNIFICANT).sum()),
+    )
 
 
-def climbed(judge: RungStatistics, first: SensorModel, lacking: Sequence[Missing], progress: bool) -> list[Rung]:
+def climbed(comparison: Comparison) -> list[Rung]:
     """The first model, then effects that the refit shows, one after another: each time the one that takes away most."""
-
-    def simulated(model: SensorModel, newest: Missing | None, *, last: bool) -> Rung:
-        few = judge.case.settings.twins.to_confirm  # the distance is large beside their error
-        mean = judge.null.mean if last else aligned_mean(model_null(judge.case, model, few), judge.null)
-        return judge.rung(model, mean, newest)
-
-    rungs = [simulated(first, None, last=not lacking)]
-    left = list(lacking)
-    bar = tqdm(total=len(left) * (len(left) + 1) // 2, desc="ladder", unit="model", disable=not progress)
-    while left:
-        tried = []
-        for m in left:
-            last = len(left) == 1
-            model = with_missing(first, lacking) if last else rungs[-1].model.with_effect(m.effect)
-            tried.append(simulated(model, m, last=last))
-            bar.update()
+    case, null, left = comparison.case, comparison.null, list(comparison.missing)
+    few = case.settings.twins.to_confirm  # the distance is large beside their error
+    rungs = [rung_of(comparison, comparison.tested, comparison.given, None)]
+    while len(left) > 1:
+        models = [rungs[-1].model.with_effect(m.effect) for m in left]
+        means = [aligned_mean(model_null(case, model, few), null) for model in models]
+        tried = [rung_of(comparison, *one) for one in zip(models, means, left, strict=True)]
         best = min(range(len(left)), key=lambda i: tried[i].gap)
         rungs.append(tried[best])
         left.pop(best)
-    bar.close()
-    return rungs
+    return rungs + [rung_of(comparison, comparison.model, null.mean, m) for m in left]
 
 
-def searched(judge: RungStatistics, model: SensorModel, names: Sequence[str]) -> list[Rung]:
-    """Rungs of effects that a search adds to a model, where that still differs from the recordings to fit."""
-    case, null, values = judge.case, judge.null, judge.values
-    if not is_discrepant(null, values_to_fit(case, null, values)):
+def search_steps(comparison: Comparison) -> list[tuple[SensorModel, Floats, Missing]]:
+    """Models of a search with their predictions (S,) and newest effects, where the null model still differs."""
+    if not comparison.disagrees:
         return []
-    rungs = []
-    for was, now in itertools.pairwise(
-        forward_selection(Problem.of(case, model, null, values), names, templates_of(names, jobs=case.jobs))
-    ):
-        if now.start.model is not was.start.model:
-            fit = was.fits[0]
-            effect = next(e for e in now.start.model.effects if e.name == fit.name)
-            sd = next(iter(fit.sd.values()), np.nan)
-            rungs.append(judge.rung(now.start.model, now.start.prediction.mean, Missing(effect, sd)))
-    return rungs
+    rounds = searched(comparison, templates_of(comparison.names, jobs=comparison.case.jobs))
+    return [
+        (end.start.model, end.start.prediction.mean, as_missing(turn.fits[0], end.start))
+        for turn, end in adding(rounds)
+    ]
+
+
+def as_missing(fit: Fit, at: Hypothesis) -> Missing:
+    """The effect of a fit as a hypothesis has it, with the error of its strength."""
+    effect = next(e for e in at.model.effects if e.name == fit.name)
+    return Missing(effect, next(iter(fit.sd.values()), np.nan))
 
 
 def rung_line(rung: Rung) -> str:

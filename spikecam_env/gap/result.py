@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, field
+from enum import Enum
 from pathlib import Path
 from typing import Any
 
@@ -15,6 +16,7 @@ from spikecam_env.gap.check.motion import DetectedMotion
 from spikecam_env.gap.check.static_part import static_pixels
 from spikecam_env.gap.observe.conditions import Condition
 from spikecam_env.gap.observe.observation import ObservedRecording
+from spikecam_env.gap.search.round import Round
 from spikecam_env.gap.twins.budget import CAMPAIGNS
 from spikecam_env.gap.unit.refit import BaseFit
 from spikecam_env.sensor import SensorModel
@@ -39,10 +41,6 @@ class Estimate:
     """Standard deviation."""
     interval: tuple[float, float] | None = None
     """Low and high end of 90 %, of the coordinate that was fitted (`fit.coordinates`); None where no error is known."""
-
-
-MOST_CONFIDENCE = 0.99
-"""Confidence in a name without a rival: an effect outside of the catalogue may explain as much."""
 
 
 @dataclass(frozen=True)
@@ -135,27 +133,6 @@ class Ranked:
     accepted: bool
     reason: str
     """Why it was accepted or rejected."""
-
-
-LEAST_STATED = 0.05
-"""Misfit that a candidate removes, from which it is stated with one decimal."""
-
-
-def why_rejected(misfit: float, before: float, best: str, needed: float) -> str:
-    """Why a candidate was not added, by its misfit alone.
-
-    Args:
-        misfit: that the candidate leaves.
-        before: misfit that its step started from.
-        best: the candidate that was preferred.
-        needed: misfit that an effect has to remove to be added.
-    """
-    removed = before - misfit
-    if removed < LEAST_STATED:
-        return "explains nothing"
-    if removed < needed:
-        return f"removes {removed:.1f} of the misfit; an effect must remove {needed:g}"
-    return f"larger misfit than {best.replace('_', ' ')}"
 
 
 @dataclass(frozen=True)
@@ -263,7 +240,7 @@ class Conclusion:
     """Of the model's effects whose strength is off: {effect: {measured, nominal, ratio}}."""
     data: tuple[str, ...] = ()
     """Notes on the recordings: contradictions first (for verdict `data`), then how the gap is to be read
-    (`verdict.notes.Note`), then labels and pixels that were left out."""
+    (`Note`), then labels and pixels that were left out."""
     gap: Gap | None = None
     """On the held-out recordings; None where nothing is held out."""
     statistics: tuple[Statistic, ...] = ()
@@ -393,3 +370,32 @@ def json_value(value: Any) -> Any:
     if isinstance(value, NDArray | np.ndarray):
         return value.tolist()
     raise TypeError(type(value))
+
+
+class Note(str, Enum):
+    """Why the gap on recordings held out is no check.  The value is the sentence that page, terminal and JSON state."""
+
+    PARAMETERS_FROM_HELD_OUT = (
+        "The held-out recordings were fitted too, within the errors of the first fit: the gap on them is no "
+        "independent check."
+    )
+    """The recordings to fit left parameters open, and those held out were fitted too."""
+
+    ONLY_HELD_OUT_DISAGREE = (
+        "The recordings to fit agree with the model, as given or with the effects found first; those held out do not. "
+        "Held-out recordings of moving light were therefore fitted: the gap on them is no independent check."
+    )
+    """Only held-out motion disagrees with the model."""
+
+    __str__ = str.__str__  # the sentence, as StrEnum has it from Python 3.11 on
+
+
+def notes_of(rounds: Sequence[Round]) -> list[str]:
+    """Notes on the rounds of a search whose effects were kept."""
+    from_held_out = [Note.PARAMETERS_FROM_HELD_OUT] if any(r.used_held_out for r in rounds) else []
+    return [*from_held_out, *([Note.ONLY_HELD_OUT_DISAGREE] if any(r.motion_alone for r in rounds) else [])]
+
+
+def gap_is_fitted(notes: Sequence[str]) -> bool:
+    """Whether recordings held out were fitted, by the kinds of notes and not by their words."""
+    return any(isinstance(note, Note) for note in notes)

@@ -25,7 +25,7 @@ TUNED = "set on the blind trial's part `tune`"
 CONSTANTS = {
     "deviance": ("stop",),
     "judging": ("heavy", "tolerance", "clear", "apart", "as_well"),
-    "baseline": ("least_gross", "irregular", "least_counts"),
+    "baseline": ("least_gross", "irregular", "least_counts", "least_error", "least_contrast"),
     "unit": ("usual_noise", "identifiable", "own_share"),
     "twins": ("of_events", "target_size", "most_extrapolated", "converged", "overrun"),
     "fitting": ("visible", "most_steps", "small_step", "long_step", "longest_step"),
@@ -38,12 +38,20 @@ CONSTANTS = {
         "line",
         "least_spikes",
         "descents",
+        "campaigns_per_effect",
     ),
     "concluding": ("large_share", "local_noises", "times_expected", "least_frames", "line_ratio"),
-    "bounding": ("most_effect_size", "overshoot"),
-    "maps": ("steps",),
+    "bounding": ("most_effect_size", "overshoot", "resolution", "campaigns"),
+    "maps": ("steps", "most_left", "units", "most_effects"),
 }
 """Numbers that were settings once, by stage."""
+
+
+UNITS_OF_MAPS = 8
+"""Fresh units over which a prediction of maps of rates is averaged; a choice."""
+
+EFFECTS_OF_MAPS = 5
+"""Effects that are named together in maps of rates; a choice."""
 
 
 def setting(default: Any, unit: str, meaning: str, source: str, least: float = 0.0, most: float = math.inf) -> Any:
@@ -145,15 +153,8 @@ class Judging:
 
 @dataclass(frozen=True)
 class Baseline:
-    """Before a search: labels and motion."""
+    """Before a search: motion."""
 
-    least_error: float = setting(
-        1e-3,
-        "relative",
-        "Error of a label from which it is reported.  An array that fires in all frames but so few fires in every one.",
-        CHOICE,
-        most=1.0,
-    )
     false_alarm: float = setting(
         1e-3,
         "p, of a recording",
@@ -161,18 +162,6 @@ class Baseline:
         "0 of 140 static recordings are called moving (docs/gap.md)",
         most=1.0,
     )
-    least_contrast: float = setting(
-        0.05,
-        "relative",
-        "Change of a window's rate from which it moves.",
-        "local effects of a camera in the blind trial, at forty times their limit, change a corner by 0.01",
-    )
-
-    @property
-    def least_spread(self) -> float:
-        """Standard deviation of pixels' response, or of an interval, from which there is any, relative: its two sides
-        are `least_error` apart."""
-        return self.least_error / 2
 
 
 @dataclass(frozen=True)
@@ -220,12 +209,6 @@ class Searching:
     """Limits of a search."""
 
     most_effects: int = setting(3, "effects", "Named together.", CHOICE)
-    campaigns_per_effect: int = setting(
-        16,
-        "campaigns",
-        "Cost of another effect, by which the budget allows it.",
-        "measured: 13 to 25 in four diagnoses",
-    )
     most_fitted: int = setting(5, "candidates", "Fitted in a round at most, the best by their templates.", CHOICE)
 
     @property
@@ -255,33 +238,10 @@ class Concluding:
         TUNED,
     )
 
-
-@dataclass(frozen=True)
-class Bounding:
-    """Upper bounds of effects that were not found."""
-
-    resolution: float = setting(
-        0.6,
-        "of a bound",
-        "The least strength that would be refuted is not below it.",
-        "a choice, stated on the page",
-        most=1.0,
-    )
-    campaigns: int = setting(150, "campaigns", "Cost of all bounds, by which the budget allows them.", "measured")
-
-
-@dataclass(frozen=True)
-class MapSettings:
-    """Recordings that are rates only."""
-
-    units: int = setting(8, "units", "Over which a prediction is averaged.", CHOICE, least=2)
-    most_effects: int = setting(5, "effects", "Named together.", CHOICE)
-    most_left: float = setting(
-        0.08,
-        "of the mean square beyond chance",
-        "A name may leave so much.",
-        "of a mean square: statistics of maps are hundreds of noises off",
-    )
+    @property
+    def least_margin_map(self) -> float:
+        """As `least_margin`, of maps of rates: half of it, since all candidates change the same few statistics."""
+        return self.least_margin / 2
 
 
 @dataclass(frozen=True)
@@ -302,8 +262,6 @@ class DiagnosisSettings:
     twins: Twins = field(default_factory=Twins)
     searching: Searching = field(default_factory=Searching)
     concluding: Concluding = field(default_factory=Concluding)
-    bounding: Bounding = field(default_factory=Bounding)
-    maps: MapSettings = field(default_factory=MapSettings)
 
     def __post_init__(self) -> None:
         for stage in fields(self):
@@ -351,6 +309,17 @@ class DiagnosisSettings:
             return cls.of(changes)
         except InputError as error:
             raise InputError(f"{os.fspath(path)}: {error}") from error
+
+    @property
+    def of_maps(self) -> DiagnosisSettings:
+        """The settings of a search in maps of rates."""
+        return replace(
+            self,
+            deviance=replace(self.deviance, accept=self.deviance.accept_map),
+            twins=replace(self.twins, drawn_units=UNITS_OF_MAPS),
+            searching=replace(self.searching, most_effects=EFFECTS_OF_MAPS),
+            concluding=replace(self.concluding, least_margin=self.concluding.least_margin_map),
+        )
 
     def changed(self) -> dict[str, Any]:
         """Settings that differ from their defaults: {"stage.name": value}."""

@@ -18,8 +18,7 @@ from spikecam_env.gap import Bars, Flat, Step, read_campaign, write_campaign
 from spikecam_env.gap.diagnose import diagnose, read_case
 from spikecam_env.gap.report.page import report
 from spikecam_env.gap.report.reproduce import command_of
-from spikecam_env.gap.result import VERDICTS, Diagnosis
-from spikecam_env.gap.verdict.notes import Note
+from spikecam_env.gap.result import VERDICTS, Diagnosis, Note
 from spikecam_env.sensor import SensorModel
 
 pytestmark = pytest.mark.slow

@@ -22,7 +22,6 @@ from spikecam_env.gap.check import motion
 from spikecam_env.gap.compare.distance import is_significant
 from spikecam_env.gap.compare.prediction import Null
 from spikecam_env.gap.diagnose import diagnose, read_case
-from spikecam_env.gap.maps import diagnose_maps
 from spikecam_env.gap.report.page import report
 from spikecam_env.gap.screen.screen import Screened
 from spikecam_env.gap.search import shortlist
@@ -50,11 +49,10 @@ def test_a_former_setting_is_refused_as_a_constant(name):
 
 
 @pytest.mark.parametrize("settings", [{"deviance.tie": 8.0}, {}, 0, "fast", DiagnosisSettings, Deviance()])
-@pytest.mark.parametrize("function", [diagnose, read_case, diagnose_maps])
+@pytest.mark.parametrize("function", [diagnose, read_case])
 def test_settings_of_another_type_are_refused_before_any_work(function, settings):
-    options = {"names": ()} if function is diagnose_maps else {}
     with pytest.raises(InputError, match=r"settings = .*; they must be a DiagnosisSettings"):
-        function(None, "scsim", settings=settings, **options)
+        function(None, "scsim", settings=settings)
 
 
 def test_a_stage_of_another_type_is_refused():

@@ -13,6 +13,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from spikecam_env.gap.check.label_audit import LEAST_ERROR
 from spikecam_env.gap.compare.distance import CLEAR
 from spikecam_env.gap.twins.case import Case, refit_recordings, twins
 from spikecam_env.gap.twins.fresh_units import width
@@ -21,6 +22,10 @@ from spikecam_env.robust import scatter
 from spikecam_env.sensor import Effect, SensorModel
 from spikecam_env.sensor.effects import CATALOGUE
 from spikecam_env.sensor.effects.base import build
+
+LEAST_SPREAD = LEAST_ERROR / 2
+"""Relative standard deviation of pixels' response, or of an interval, from which there is any: its two sides are the
+least error of a label apart."""
 
 FIRED_SHARE = 0.3
 """Of the spikes that a dark level would give, those that dark recordings hold where the level is there."""
@@ -38,8 +43,8 @@ class Missing:
 
 def missing_effects(case: Case, model: SensorModel, names: Sequence[str]) -> list[Missing]:
     """Effects that the refit shows and the model lacks, of the candidates in `names`; in the order of the pixel."""
-    found = [_built(one) for one in (*_response(case, model), *_dark_level(case, model)) if one.name in names]
-    return found + [_built(one) for one in _noise(case, with_missing(model, found)) if one.name in names]
+    missing = [_built(one) for one in (*_response(case, model), *_dark_level(case, model)) if one.name in names]
+    return missing + [_built(one) for one in _noise(case, with_missing(model, missing)) if one.name in names]
 
 
 class _Size(NamedTuple):
@@ -59,7 +64,7 @@ def _response(case: Case, model: SensorModel) -> Iterator[_Size]:
     """The spread of pixels' gain, where the model has none."""
     live = case.base.live
     spread = width(case.base.gain[live])
-    if not _has(model, RESPONSE) and spread > case.settings.baseline.least_spread:
+    if not _has(model, RESPONSE) and spread > LEAST_SPREAD:
         sd = spread / _root_of_twice(live)
         yield _Size("conversion_gain_spread", spread, sd, ("bias_voltage_spread", "capacitor_spread"))
 
@@ -87,7 +92,7 @@ def _dark_level(case: Case, model: SensorModel) -> Iterator[_Size]:
 
 def _noise(case: Case, model: SensorModel) -> Iterator[_Size]:
     """The noise of a spike, where the model has none."""
-    white, least = case.base.white, case.settings.baseline.least_spread**2
+    white, least = case.base.white, LEAST_SPREAD**2
     if not _has(model, NOISE) and white > least and is_noise(case, model):
         yield _Size("shot_noise", 1.0 / white, 0.02 / white, ("reset_noise", "excess_threshold_noise"))
 
@@ -101,9 +106,9 @@ def _root_of_twice(live: NDArray[np.bool_]) -> float:
     return float(np.sqrt(2 * live.sum()))
 
 
-def with_missing(model: SensorModel, found: Sequence[Missing]) -> SensorModel:
+def with_missing(model: SensorModel, missing: Sequence[Missing]) -> SensorModel:
     """The model with all that was found."""
-    for m in found:
+    for m in missing:
         model = model.with_effect(m.effect)
     return model
 

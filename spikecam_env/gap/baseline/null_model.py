@@ -12,11 +12,14 @@ from spikecam_env.gap.compare.prediction import Null, null_of, values_of
 from spikecam_env.gap.observe.conditions import Condition
 from spikecam_env.gap.statistics import StatisticKey
 from spikecam_env.gap.twins.case import Case, twins
-from spikecam_env.gap.twins.fresh_units import drawn_banks
+from spikecam_env.gap.twins.rate_maps import MapCase
 from spikecam_env.gap.unit.indirect_inference import inferred_unit
 from spikecam_env.gap.unit.refit import BaseFit, constrained_refit
 from spikecam_env.sensor import SensorModel
 from spikecam_env.types import Floats
+
+LEAST_NOISE = 1e-3
+"""Of its floor, the noise of a statistic that no fresh unit moves."""
 
 
 def model_null(case: Case, model: SensorModel, count: int) -> Null:
@@ -30,8 +33,7 @@ def model_null(case: Case, model: SensorModel, count: int) -> Null:
         count: number of twins.
     """
     base, units = unit_under(case, model), case.settings.twins.drawn_units
-    limits = case.settings.unit.spread_limits
-    drawn = drawn_banks(model, case.base, case.conditions, case.shape, units, case.seed, limits)
+    drawn = case.drawn_banks(model, units)
     made = twins(case, model, base, range(count))
     banks = [{**t.bank, **d} for t, d in zip(made, drawn, strict=False)]
     null = null_of(banks, list(case.bank), [t.base for t in made if t.base], case.settings)
@@ -50,6 +52,13 @@ def model_null(case: Case, model: SensorModel, count: int) -> Null:
         twins=np.where(of_pattern, units, null.twins),
         weight=np.where(of_pattern, 1.0 / recordings_per_statistic(null.keys, case.conditions), 1.0),
     )
+
+
+def maps_null(case: MapCase, model: SensorModel) -> Null:
+    """The prediction of maps of rates, by fresh units."""
+    banks = case.drawn_banks(model, case.settings.twins.drawn_units)
+    null = null_of(banks, list(case.bank), [None] * len(banks), case.settings)
+    return replace(null, sd=np.maximum(null.sd, LEAST_NOISE * null.floor))
 
 
 def unit_under(case: Case, model: SensorModel) -> BaseFit:

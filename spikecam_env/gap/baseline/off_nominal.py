@@ -70,6 +70,20 @@ def off_nominal(case: Case, model: SensorModel, base: BaseFit) -> OffNominal:
     return OffNominal(rows, base)
 
 
+def spreads_off(case: Case, model: SensorModel, fitted: SensorModel) -> dict[str, dict[str, float]]:
+    """Spreads of a model that a fitted model has in another amount than units differ by, as rows of `OffNominal`."""
+    rows = {}
+    strengths = {e.name: e.parameters() for e in fitted.effects}
+    for effect in model.effects:
+        key = next((of[effect.name] for of in SPREAD_PARAMETERS.values() if effect.name in of), None)
+        if key is None or effect.name not in strengths:
+            continue
+        measured, nominal = strengths[effect.name][key], effect.parameters()[key]
+        if unusual(measured / nominal, case.settings.unit.usual):
+            rows[effect.name] = {"measured": measured, "nominal": nominal, "ratio": measured / nominal}
+    return rows
+
+
 def level_off(values: Floats, nominal: Floats) -> float:
     """Ratio of two levels over pixels: of their medians or of their means, whichever is nearer to 1; 1 between both.
 

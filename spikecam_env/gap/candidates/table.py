@@ -9,7 +9,7 @@ from dataclasses import dataclass, fields
 from spikecam_env.checked import each_once
 from spikecam_env.errors import unknown_name
 from spikecam_env.gap.observe.conditions import STEADY_KNOWN, Condition
-from spikecam_env.gap.observe.observation import ObservedRecording
+from spikecam_env.gap.twins.case import Case
 from spikecam_env.sensor import CATALOGUE, Effect, SensorModel
 from spikecam_env.sensor.effects.identification import Identification, Needs, Response
 
@@ -161,16 +161,15 @@ class Candidates:
         return all(c.only_contrast for c in self.each)
 
 
-def expected_events(
-    name: str, parameters: Mapping[str, float], shown: Sequence[Condition], seen: Sequence[ObservedRecording]
-) -> float:
+def expected_events(name: str, parameters: Mapping[str, float], case: Case) -> float:
     """Pixels, spikes or frames of pixels that an effect changes in the steady recordings to fit of a campaign, by
     expectation; infinite where it is no share of such."""
     share = candidate(name).share
     if share is None:
         return math.inf
-    steady = [o for c, o in zip(shown, seen, strict=True) if c.use == "fit" and not c.moves]
-    pixels = max((o.times.count.size for o in steady), default=0)
+    shown = zip(case.conditions, case.observations, strict=not case.rates_only)
+    steady = [o for c, o in shown if c.use == "fit" and not c.moves]
+    pixels = math.prod(case.shape)
     spikes = float(sum(o.times.count.sum() for o in steady))
     of = {"pixels": pixels, "spikes": spikes, "frames": sum(pixels * o.frames for o in steady) - spikes}
     return parameters[share[0]] * of[share[1]]

@@ -17,6 +17,10 @@ from spikecam_env.gap.twins.case import Case
 from spikecam_env.robust import scatter
 from spikecam_env.types import Floats
 
+LEAST_ERROR = 1e-3
+"""Relative error of a label from which it is reported; a choice.  An array that fires in all frames but so few fires in
+every one."""
+
 LEAST_GROSS = 0.02
 """Relative error of a dark recording, and curvature by exchanged labels, from which they are reported: of few spikes a
 pixel, the rate between first and last is biased by their number squared."""
@@ -49,16 +53,18 @@ def audit(case: Case) -> list[Contradiction]:
 
 def silent(case: Case, suspect: set[str]) -> list[Contradiction]:
     """Lit recordings without spikes, and any that never stop."""
-    found = []
-    all_frames, usual = 1 - case.settings.baseline.least_error, case.settings.unit.usual
+    contradictions = []
+    all_frames, usual = 1 - LEAST_ERROR, case.settings.unit.usual
     for c, o in zip(case.conditions, case.observations, strict=True):
         mean = float(o.times.count.mean()) / o.frames
         if c.light is not None and c.level > 0 and mean == 0:
-            found.append(Contradiction("silent", (c.name,), f"{c.name}: labelled radiance {c.level:g}, but no spikes"))
+            contradictions.append(
+                Contradiction("silent", (c.name,), f"{c.name}: labelled radiance {c.level:g}, but no spikes")
+            )
         if c.light is not None and c.level * usual < 1 and mean > all_frames:
             text = f"{c.name}: labelled radiance {c.level:g}, but every pixel fires in every frame"
-            found.append(Contradiction("silent", (c.name,), text))
-    return found
+            contradictions.append(Contradiction("silent", (c.name,), text))
+    return contradictions
 
 
 def _steady_levels(case: Case, suspect: set[str]) -> tuple[list[str], Floats, Floats]:
@@ -128,7 +134,7 @@ def _wrong_flat(case: Case, name: str, names: Sequence[str], off: float, left: f
     A label is one number and makes no interval irregular; an effect that begins at that level differs from pixel to
     pixel.
     """
-    if abs(off) < case.settings.baseline.least_error:
+    if abs(off) < LEAST_ERROR:
         return []
     differs = pixel_spread(case, name, names) > PIXELS_DIFFER * abs(off)
     if differs or irregular_share(case, name) > IRREGULAR * abs(off):

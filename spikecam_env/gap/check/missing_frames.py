@@ -31,7 +31,7 @@ SEGMENTS = 8
 
 def dropped(case: Case, suspect: set[str]) -> list[Contradiction]:
     """Frames missing (or doubled): from one frame on all pixels are ahead of (behind) their time."""
-    found = []
+    contradictions = []
     for c, o in zip(case.conditions, case.observations, strict=True):
         if c.name in suspect or c.light is None:
             continue
@@ -42,8 +42,8 @@ def dropped(case: Case, suspect: set[str]) -> list[Contradiction]:
             text = f"{c.name}: about {abs(frames):.0f} frames {what} near frame {at}"
             if not c.moves:  # spikes repeat: so many missing look like the rest of an interval too many
                 text = f"{c.name}: frames missing or doubled near frame {at}"
-            found.append(Contradiction("dropped", (c.name,), text))
-    return found
+            contradictions.append(Contradiction("dropped", (c.name,), text))
+    return contradictions
 
 
 def _jump_steady(case: Case, o: ObservedRecording) -> tuple[int, float] | None:

@@ -13,7 +13,7 @@ windows with them (`shared_variance`); motion does not.  Rows are no regions: wi
 that changes of sign from row to row cancel.
 
 Blind to: changes of all pixels of a level by the same share, regions smaller than the least of SIDES, and contrast
-below `least_contrast`, which local effects of a camera reach; slow noise of single pixels (1/f) is below it in the mean
+below `LEAST_CONTRAST`, which local effects of a camera reach; slow noise of single pixels (1/f) is below it in the mean
 of a window.
 """
 
@@ -37,6 +37,10 @@ SIDES = (4, 8, 16)
 
 SPANS = (1, 4, 8)
 """Lengths of the windows [sixteenths of a recording]."""
+
+LEAST_CONTRAST = 0.05
+"""Relative change of a window's rate from which it moves: local effects of a camera in the blind trial, at forty times
+their limit, change a corner by 0.01."""
 
 MOST_OF_A_PIXEL = 3.0
 """Standard deviations that a single pixel counts at most in a deviate; a contrast is of all that it changes."""
@@ -289,7 +293,7 @@ def beyond(
     z = capped / np.sqrt(np.maximum(times * variance + (times - 1.0) * np.abs(capped) / 3.0, 1e-9))
     contrast = off / np.maximum(expected, 1e-9)
     enough = np.maximum(expected, expected + off) >= LEAST_COUNTS
-    for k, i, j in np.argwhere(enough & (np.abs(z) > least_z) & (np.abs(contrast) > limits.least_contrast)):
+    for k, i, j in np.argwhere(enough & (np.abs(z) > least_z) & (np.abs(contrast) > LEAST_CONTRAST)):
         blocks = (int(k) * span, (int(k) + 1) * span)
         yield _Window(int(rows[i]), int(columns[j]), *size, blocks, float(z[k, i, j]), float(contrast[k, i, j]))
 

@@ -28,15 +28,15 @@ GAIN = 0.5
 
 def flipped(case: Case, suspect: set[str]) -> list[Contradiction]:
     """Recordings that fit their light and the unit's pattern upside down or mirrored."""
-    found = []
+    contradictions = []
     for i, c in enumerate(case.conditions):
         pictures = _seen_and_expected(case, i)
         turn = _better_turn(*pictures) if pictures else None
         if turn:
             name, turned, right = turn
             text = f"{c.name}: {name} (correlation with its light {right:.2f}, once corrected {turned:.2f})"
-            found.append(Contradiction("flipped", (c.name,), text))
-    return found
+            contradictions.append(Contradiction("flipped", (c.name,), text))
+    return contradictions
 
 
 def _seen_and_expected(case: Case, i: int) -> tuple[Floats, Floats] | None:

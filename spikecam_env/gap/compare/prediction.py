@@ -92,7 +92,7 @@ class Null:
 def null_of(
     banks: Sequence[Mapping[StatisticKey, float]],
     keys: Sequence[StatisticKey],
-    refits: Sequence[BaseFit] = (),
+    refits: Sequence[BaseFit | None] = (),
     settings: DiagnosisSettings | None = None,
 ) -> Null:
     """From simulated campaigns 0, 1, ..., for the statistics in `keys` that all of them have."""

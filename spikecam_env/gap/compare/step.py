@@ -126,20 +126,20 @@ def own_step_covariance(null: Null, predicted: Prediction, solve: Floats) -> Flo
     return total + step_covariance(solve * shown, predicted.units) if predicted.units is not None else total
 
 
-def slope_of(null: Null, measured: Floats, there: Prediction, here: Prediction, step: float) -> Floats:
+def slope_of(null: Null, measured: Floats, moved: Prediction, at: Prediction, step: float) -> Floats:
     """(S,) change of predictions over `step`, 0 where it is not clear of the twins' own noise: hundreds of statistics
     that do not move would drown those that do (regression dilution)."""
-    change, _, clear = change_of(null, measured, there, here)
+    change, _, clear = change_of(null, measured, moved, at)
     return np.where(clear, change, 0.0) / step
 
 
-def change_of(null: Null, measured: Floats, there: Prediction, here: Prediction) -> tuple[Floats, Floats, Masks]:
+def change_of(null: Null, measured: Floats, moved: Prediction, at: Prediction) -> tuple[Floats, Floats, Masks]:
     """((S,) change from one prediction to another, (S,) its noise, (S,) whether it is clear of that).  Statistics that
     were not measured (NaN) may move more, and are judged apart."""
-    change, known = there.mean - here.mean, np.isfinite(measured)
-    own2 = np.maximum(own_variance(null, there), own_variance(null, here))
-    if there.units is not None and here.units is not None:
-        apart = there.units - here.units
+    change, known = moved.mean - at.mean, np.isfinite(measured)
+    own2 = np.maximum(own_variance(null, moved), own_variance(null, at))
+    if moved.units is not None and at.units is not None:
+        apart = moved.units - at.units
         own2 = np.where(np.isfinite(apart).all(axis=0), apart.var(axis=0, ddof=1) / len(apart), own2)
     own2 = np.maximum(own2, 1e-300)
     here_known, elsewhere = np.where(known, change, 0.0), np.where(known, 0.0, change)

@@ -1,30 +1,48 @@
 """Fitting one candidate: simulate the campaign with it, scale and shape it until its statistics are the measured ones.
 
 Every twin is compared with the null's of the same draws, so their difference is the effect alone.  Statistics move in
-proportion to the strength (or its square), so each twin says by how much to scale the next.  `shapes` fits the other
-parameters.  The unit is refitted along the way, so that the candidate cannot borrow from it.
+proportion to the strength (or its square), so each twin says by how much to scale the next.  Other parameters cost a
+twin each, and are fitted only where they can matter.  The unit is refitted along the way, so that the candidate cannot
+borrow from it.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from spikecam_env.gap.candidates.strength import MOST_EXTRAPOLATED, TARGET_SIZE, amplified, bounded, with_effect
 from spikecam_env.gap.candidates.table import candidate
-from spikecam_env.gap.compare.distance import effect_size
+from spikecam_env.gap.compare.distance import effect_size, is_significant
 from spikecam_env.gap.compare.prediction import Prediction, with_change_scaled
 from spikecam_env.gap.compare.step import likeliest, scale_to, slope_of, step_of
-from spikecam_env.gap.fit.gauss_newton import COMPARED, LONGEST_STEP, MOST_STEPS, SMALL_STEP
+from spikecam_env.gap.fit.coordinates import error_of
+from spikecam_env.gap.fit.gauss_newton import (
+    COMPARED,
+    LONGEST_STEP,
+    MOST_STEPS,
+    SMALL_STEP,
+    UNITS_OF_A_STEP,
+    Descent,
+    Free,
+    descend,
+    probe_of,
+    spreads_of,
+)
 from spikecam_env.gap.fit.hypothesis import Fit
-from spikecam_env.gap.fit.problem import Problem
-from spikecam_env.gap.fit.recordings import OF_RANDOM_COURSE, twins_of
+from spikecam_env.gap.fit.problem import OF_RANDOM_COURSE, Problem, twins_of
 from spikecam_env.gap.unit.indirect_inference import extrapolated_unit, has_converged
 from spikecam_env.gap.unit.refit import BaseFit, constrained_refit
 from spikecam_env.types import Floats
+
+STARTS_OF_MAPS = (0.1, 1.0, 10.0)
+"""Factors of a strength from which a pattern is fitted in maps of rates; a choice: one is within a factor of 3."""
+
+WORTH = 0.5
+"""Of what the best removes: less is not worth another fit, of a start, a shape, or a runner-up of an earlier effect."""
 
 VISIBLE = 4.0
 """Least size of a simulated effect [noises] from which its strength is scaled."""
@@ -54,6 +72,8 @@ def fit(
         white: s^2 of the unit at `start`, over the refit's.
     """
     problem.begin(f"fitting {name}")
+    if problem.case.rates_only:
+        return _fit_maps(problem, name, start)
     if candidate(name).is_pattern:
         return _fit_pattern(problem, name, start)
     if candidate(name).random_course:
@@ -248,6 +268,13 @@ def _fit_random_course(problem: Problem, name: str, parameters: dict[str, float]
     return problem.fit_of(name, parameters, with_effect(problem.model, name, parameters), base, predicted, sds)
 
 
+def _fit_maps(problem: Problem, name: str, start: Mapping[str, float]) -> Fit:
+    """All parameters of a pattern, with the spreads of the unit, by maps of rates: from the best of three strengths."""
+    own = {key: start[key] for key in problem.fitted_parameters(name)}
+    tried = [_of_pattern(problem, name, own, candidate(name).strength, f, UNITS_OF_A_STEP) for f in STARTS_OF_MAPS]
+    return with_fitted_shapes(problem, min(tried, key=lambda f: f.misfit))
+
+
 def _fit_pattern(problem: Problem, name: str, start: Mapping[str, float]) -> Fit:
     """Coarse to fine search over the strength (and one more parameter), drawing units."""
     parameters = bounded(name, start)
@@ -256,10 +283,54 @@ def _fit_pattern(problem: Problem, name: str, start: Mapping[str, float]) -> Fit
         for key in candidate(name).fitted:
             centre = best.parameters if best else parameters
             for factor in factors:
-                tried = bounded(name, {**centre, key: centre[key] * factor})
-                model = with_effect(problem.model, name, tried)
-                predicted = problem.with_pattern(model, problem.null.prediction)
-                now = problem.fit_of(name, tried, model, constrained_refit(model, problem.case.base), predicted)
+                now = _of_pattern(problem, name, centre, key, factor)
                 best = now if best is None or now.misfit < best.misfit else best
     assert best is not None
     return best
+
+
+def _of_pattern(
+    problem: Problem, name: str, parameters: Mapping[str, float], key: str, factor: float, units: int | None = None
+) -> Fit:
+    """A pattern with one of its parameters multiplied, by so many drawn units; None: as many as the null has."""
+    tried = bounded(name, {**parameters, key: parameters[key] * factor})
+    model = with_effect(problem.model, name, tried)
+    predicted = problem.with_pattern(model, problem.null.prediction, units)
+    return problem.fit_of(name, tried, model, constrained_refit(model, problem.case.base), predicted)
+
+
+def with_shapes_to_fit(problem: Problem, before: float, fits: Sequence[Fit]) -> list[Fit]:
+    """Fits whose other parameters can matter: they remove a share (`Searching.worth`) of the best's misfit.
+
+    None of them where a fit without other parameters leaves less, and no more than chance.
+
+    Args:
+        before: misfit of the model itself.
+    """
+    least = min((f.misfit for f in fits), default=np.inf)
+    simple = min((f for f in fits if not candidate(f.name).has_shapes), key=lambda f: f.misfit, default=None)
+    explained = simple is not None and not is_significant(problem.null, simple.rho, simple.prediction)
+    enough = simple.misfit if simple and explained else np.inf
+    near = before - WORTH * (before - least)
+    return [f for f in fits if candidate(f.name).has_shapes and f.misfit < min(near, enough)]
+
+
+def with_fitted_shapes(problem: Problem, fitted: Fit) -> Fit:
+    """The fit with all fitted parameters of its candidate at their best."""
+    name = fitted.name
+    problem.begin(f"fitting the shape of {name}")
+    only = problem.affected([name], fitted.prediction.mean - problem.null.mean)
+    probe = probe_of(problem, [name], only, twins_of(name))
+    free = [*((name, key) for key in problem.fitted_parameters(name)), *spreads_of(problem, fitted.model)]
+    end = descend(problem, probe, fitted.model, fitted.base, free, COMPARED)
+    shaped = where_ended(problem, fitted, end, free)
+    return fitted if shaped.misfit > fitted.misfit else shaped
+
+
+def where_ended(problem: Problem, fitted: Fit, end: Descent, free: Free) -> Fit:
+    """The fit at the end of a descent over the parameters `free`, with errors of its own effect's."""
+    values = next(e for e in end.model.effects if e.name == fitted.name).parameters()
+    errors = zip(free, np.sqrt(np.diag(end.covariance)), strict=True)
+    sd = {k: error_of(name, k, values[k], float(e)) for (name, k), e in errors if name == fitted.name}
+    own = {k: values[k] for k in fitted.parameters}
+    return problem.fit_of(fitted.name, own, end.model, end.base, end.prediction, sd)

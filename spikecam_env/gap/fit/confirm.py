@@ -11,8 +11,7 @@ from spikecam_env.gap.candidates.table import Candidates, candidate
 from spikecam_env.gap.compare.distance import effect_size
 from spikecam_env.gap.compare.prediction import Null, Prediction, with_change_scaled
 from spikecam_env.gap.fit.hypothesis import Fit
-from spikecam_env.gap.fit.problem import Problem
-from spikecam_env.gap.fit.recordings import OF_RANDOM_COURSE, twins_of, with_held_out
+from spikecam_env.gap.fit.problem import OF_RANDOM_COURSE, Problem, twins_of, with_held_out
 from spikecam_env.gap.twins.fresh_units import drawn_response
 from spikecam_env.gap.unit.conversion import LINES
 from spikecam_env.gap.unit.indirect_inference import IDENTIFIABLE, extrapolated_unit

@@ -40,12 +40,11 @@ def error_of(name: str, key: str, value: float, sd: float) -> float:
     return abs(value) * sd if period is None else PHASE_UNIT * period * sd
 
 
-def interval_of(name: str, key: str, value: float, sd: float, *, by_steps: bool = False) -> tuple[float, float] | None:
+def interval_of(name: str, key: str, value: float, sd: float) -> tuple[float, float] | None:
     """90 % interval of a parameter, by a normal error of its coordinate, within the parameter's range.
 
     Args:
         sd: its standard deviation, as of `error_of`.
-        by_steps: whether it was fitted as it is, and not by its logarithm; a value of 0 always was.
 
     Returns:
         (low, high) in the parameter's unit; None where no error is known.  Low is above high where the interval of a
@@ -60,7 +59,7 @@ def interval_of(name: str, key: str, value: float, sd: float, *, by_steps: bool 
         return (
             (low, high) if 2 * half >= period else tuple(low + (v - low) % period for v in (value - half, value + half))
         )
-    if by_steps or value == 0:
+    if value == 0:
         ends = [value - half, value + half]
     else:
         factor = math.exp(min(half / abs(value), _MOST_LOGARITHMS))

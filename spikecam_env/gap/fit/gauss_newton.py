@@ -20,6 +20,7 @@ from spikecam_env.gap.compare.step import change_of, step_of
 from spikecam_env.gap.fit.coordinates import moved_value
 from spikecam_env.gap.fit.predict import settled_unit
 from spikecam_env.gap.fit.problem import Problem
+from spikecam_env.gap.twins.fresh_units import SPREAD_PARAMETERS, with_spreads_scaled
 from spikecam_env.gap.unit.indirect_inference import has_converged
 from spikecam_env.gap.unit.refit import BaseFit, constrained_refit
 from spikecam_env.sensor import SensorModel
@@ -47,11 +48,17 @@ LONG_STEP = 0.5
 LONGEST_STEP = 0.7
 """Largest step of a logarithm at once, a factor of two, within what was open of the parameter before."""
 
-WHITE = ("the unit", "white")
-"""The unit's own s^2, among parameters by effect and name, where an effect hides it."""
+UNIT = "the unit"
+"""Its own parameters stand under this name among parameters by effect and name."""
 
-WHITE_STEP = -0.2
-"""Step of the logarithm of WHITE to take a derivative by."""
+WHITE = (UNIT, "white")
+"""The unit's own s^2, where an effect hides it."""
+
+UNIT_STEP = -0.2
+"""Step of the logarithm of a unit's parameter to take a derivative by."""
+
+UNITS_OF_A_STEP = 4
+"""Fresh units of a twin of maps in a descent; a choice: they show their own chance."""
 
 STRENGTH_STEPS = (0.25, 1.0)
 """Steps of a strength's logarithm to take a derivative by, at least and at most."""
@@ -87,11 +94,12 @@ def probe_of(problem: Problem, names: Sequence[str], only: Sequence[int], count:
         only: recordings to simulate, by index; none where all effects change the pattern alone.
         count: number of twins.
     """
-    draws_units = Candidates(tuple(names)).any_pattern
+    maps = problem.case.rates_only
+    draws_units, units = Candidates(tuple(names)).any_pattern or maps, UNITS_OF_A_STEP if maps else None
 
     def statistics(model: SensorModel, base: BaseFit) -> Prediction:
         made = problem.predict(model, constrained_refit(model, base), count, only) if only else problem.null.prediction
-        return problem.with_pattern(model, made) if draws_units else made
+        return problem.with_pattern(model, made, units) if draws_units else made
 
     return statistics
 
@@ -153,11 +161,21 @@ def broyden(columns: Floats, step: Floats, change: Floats, noise: Floats | float
     return np.asarray(columns + corrected * np.outer(surprise, step) / (step @ step))
 
 
+def spreads_of(problem: Problem, model: SensorModel) -> list[tuple[str, str]]:
+    """Spreads of the unit that are fitted with effects: those of maps of rates, where no refit shows each pixel."""
+    has = {e.name for e in model.effects} if problem.case.rates_only else set()
+    return [(UNIT, part) for part, spreads in SPREAD_PARAMETERS.items() if has & spreads.keys()]
+
+
 def moved(model: SensorModel, base: BaseFit, free: Free, step: Floats) -> tuple[SensorModel, BaseFit]:
     """The model and the unit with the coordinates of these parameters moved."""
     for (name, key), s in zip(free, step, strict=True):
         if (name, key) == WHITE:
             base = replace(base, white=base.white * float(np.exp(s)))
+            continue
+        if name == UNIT:
+            factor = float(np.exp(s))
+            model = with_spreads_scaled(model, model, {key: factor}, (factor, factor))
             continue
         here = next(e for e in model.effects if e.name == name).parameters()
         model = with_effect(model, name, bounded(name, {**here, key: moved_value(name, key, here[key], float(s))}))
@@ -212,7 +230,7 @@ def unit_after(model: SensorModel, base: BaseFit, null: Null, made: Prediction, 
 
 def prior_sd(free: Free) -> Floats:
     """(n,) standard deviations of the logarithms before any data: 1, of a shape twice the step of its derivative."""
-    fitted = [name != WHITE[0] and key != candidate(name).strength for name, key in free]
+    fitted = [name != UNIT and key != candidate(name).strength for name, key in free]
     return np.array(
         [2 * abs(candidate(f[0]).shape_step) if shape else 1.0 for f, shape in zip(free, fitted, strict=True)]
     )
@@ -229,8 +247,8 @@ def derivative_step(name: str, key: str, peak: float) -> float:
     Args:
         peak: noises by which the effect shows.
     """
-    if (name, key) == WHITE:
-        return WHITE_STEP
+    if name == UNIT:
+        return UNIT_STEP
     if key != candidate(name).strength:
         return candidate(name).shape_step
     return float(np.clip(SHOWS / max(peak, 1e-9), *STRENGTH_STEPS))

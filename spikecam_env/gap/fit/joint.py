@@ -11,12 +11,11 @@ from spikecam_env.gap.candidates.table import Candidates, candidate
 from spikecam_env.gap.compare.distance import APART
 from spikecam_env.gap.fit.confirm import confirmed
 from spikecam_env.gap.fit.coordinates import is_apart
-from spikecam_env.gap.fit.gauss_newton import WHITE, Probe, descend, probe_of
-from spikecam_env.gap.fit.hypothesis import Fit
+from spikecam_env.gap.fit.gauss_newton import WHITE, Probe, descend, probe_of, spreads_of
+from spikecam_env.gap.fit.hypothesis import Fit, Hypothesis
 from spikecam_env.gap.fit.last_step import Errors, Slopes, last_step
-from spikecam_env.gap.fit.problem import Problem
-from spikecam_env.gap.fit.recordings import twins_of, with_held_out
-from spikecam_env.gap.unit.refit import BaseFit
+from spikecam_env.gap.fit.problem import Problem, twins_of, with_held_out
+from spikecam_env.gap.unit.refit import BaseFit, constrained_refit
 from spikecam_env.types import Floats
 
 OWN_SHARE = 0.9
@@ -58,8 +57,8 @@ def _refined(problem: Problem, fitted: Fit, names: Sequence[str]) -> tuple[Fit, 
     """
     settings, probe = problem.settings, _probe(problem, fitted, names)
     free = to_refine(problem, fitted, names)
-    held = [parameter for parameter in fitted_of(names) if parameter not in free]
-    free += [WHITE] if is_noisy(problem, fitted.base) else []
+    held = [parameter for parameter in fitted_of(problem, names) if parameter not in free]
+    free += of_unit(problem, fitted)
     now, base, slopes = fitted.model, fitted.base, None
     if free:
         end = descend(problem, probe, now, base, free)
@@ -89,17 +88,33 @@ def stepped_once(problem: Problem, fitted: Fit, names: Sequence[str]) -> tuple[F
     It replaces `refined_together` where the budget refuses that: errors need at least derivatives at the fit, a twin
     each.
     """
-    free = fitted_of(names)
-    free += [WHITE] if free and is_noisy(problem, fitted.base) else []
+    free = fitted_of(problem, names)
+    free += of_unit(problem, fitted) if free else []
     slopes = Slopes.at(problem, _probe(problem, fitted, names), fitted, free)
     best, errors, own2 = with_last_step(problem, fitted, names, slopes)
     error = np.sqrt(best.prediction.error**2 + own2 * np.isnan(problem.seen))
     return replace(best, prediction=replace(best.prediction, error=error)), errors
 
 
-def fitted_of(names: Sequence[str]) -> list[tuple[str, str]]:
+def fitted_of(problem: Problem, names: Sequence[str]) -> list[tuple[str, str]]:
     """Fitted parameters of effects, by effect and name, but of random courses: one twin shows no direction of those."""
-    return [(name, key) for name in names if not candidate(name).random_course for key in candidate(name).fitted]
+    return [(n, key) for n in names if not candidate(n).random_course for key in problem.fitted_parameters(n)]
+
+
+def of_unit(problem: Problem, at: Hypothesis) -> list[tuple[str, str]]:
+    """Parameters of the unit that are fitted with effects: spreads in maps of rates, else s^2 where they hide it."""
+    return [*spreads_of(problem, at.model), *([WHITE] if is_noisy(problem, at.base) else [])]
+
+
+def with_unit_fitted(problem: Problem) -> Hypothesis:
+    """The model as given under its unit; in maps of rates, with the unit's spreads at their best."""
+    model, unmoved = problem.model, problem.null.prediction
+    at = problem.hypothesis(model, constrained_refit(model, problem.case.base), unmoved)
+    free = spreads_of(problem, model)
+    if not free:
+        return at
+    end = descend(problem, probe_of(problem, [], [], 1), model, at.base, free)
+    return problem.hypothesis(end.model, end.base, problem.with_pattern(end.model, unmoved))
 
 
 def is_noisy(problem: Problem, base: BaseFit) -> bool:
@@ -113,7 +128,7 @@ def to_refine(problem: Problem, fitted: Fit, names: Sequence[str]) -> list[tuple
     The strengths alone where the budget refuses a descent by every shape.  Effects borrow from each other by their
     strengths.  One effect that explains all is descended in full.
     """
-    free = fitted_of(names)
+    free = fitted_of(problem, names)
     strengths = [(name, key) for name, key in free if key == candidate(name).strength]
     last = len(names) == 1 and problem.is_explained(fitted.prediction)
     if last or len(strengths) == len(free):

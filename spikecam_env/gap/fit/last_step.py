@@ -19,7 +19,7 @@ from spikecam_env.gap.candidates.table import candidate
 from spikecam_env.gap.compare.step import step_of
 from spikecam_env.gap.fit.coordinates import error_of
 from spikecam_env.gap.fit.gauss_newton import (
-    WHITE,
+    UNIT,
     Free,
     Probe,
     at_settled_unit,
@@ -98,7 +98,7 @@ def last_step(problem: Problem, fitted: Fit, names: Sequence[str], slopes: Slope
     skipped = np.hypot(step - taken, curvature_of_step(free, taken) if slopes.once else 0.0)
     values = {e.name: e.parameters() for e in best.model.effects}
     for (name, key), e in zip(free, np.sqrt(np.diag(covariance) + skipped**2), strict=True):
-        if (name, key) != WHITE:
+        if name != UNIT:
             errors[name][key] = error_of(name, key, values[name][key], float(e))
     spread = exact + np.diag(skipped**2)
     return best, errors, np.einsum("sn,nm,sm->s", slopes.columns, spread, slopes.columns)
@@ -128,7 +128,7 @@ def linear_minimum(problem: Problem, fitted: Fit, slopes: Slopes, before: Floats
 
 def curvature_of_step(free: Free, taken: Floats) -> Floats:
     """(n,) error of logarithms by the curvature of the laws, after one linear step `taken` (n,)."""
-    powers = [1.0 if f == WHITE or f[1] != candidate(f[0]).strength else candidate(f[0]).power for f in free]
+    powers = [1.0 if f[0] == UNIT or f[1] != candidate(f[0]).strength else candidate(f[0]).power for f in free]
     return np.array(powers) * taken**2 / 2
 
 

@@ -9,7 +9,6 @@ import numpy as np
 
 from spikecam_env.gap.compare.prediction import Draw, Null, Prediction, paired, values_of, with_pattern_moved
 from spikecam_env.gap.twins.case import Case, twins
-from spikecam_env.gap.twins.fresh_units import drawn_banks
 from spikecam_env.gap.unit.false_spikes import false_spikes_of
 from spikecam_env.gap.unit.indirect_inference import inferred_unit
 from spikecam_env.gap.unit.refit import BaseFit
@@ -22,8 +21,10 @@ def predict_by_twins(
 ) -> Prediction:
     """Predict a model with effects by twins of the null's last `count` draws.
 
-    Recordings that are not in `only` (by index) are as in `null`.
+    Recordings that are not in `only` (by index) are as in `null`.  Twins of maps of rates are fresh units.
     """
+    if case.rates_only:
+        return with_drawn_pattern(case, model, null, null.prediction)
     numbers = [d.number for d in null.draws[-count:]]
     made = twins(case, model, base, numbers, only, {d.number: d.refit for d in null.draws})
     draws = [
@@ -40,9 +41,7 @@ def with_drawn_pattern(
 ) -> Prediction:
     """Replace the pattern statistics of a prediction by those of `count` units; None: as many as the null has."""
     count = null.settings.twins.drawn_units if count is None else count
-    limits = null.settings.unit.spread_limits
-    drawn = drawn_banks(model, case.base, case.conditions, case.shape, count, case.seed, limits)
-    values = np.array([values_of(b, null.keys) for b in drawn])
+    values = np.array([values_of(b, null.keys) for b in case.drawn_banks(model, count)])
     known = np.isfinite(values).all(axis=0)
     values = np.where(known, values, 0.0)
     mean = np.where(known, values.mean(axis=0), predicted.mean)

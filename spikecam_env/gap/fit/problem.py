@@ -1,4 +1,7 @@
-"""The problem of a fit or a search: a campaign, a model to add effects to, and the distance between them."""
+"""The problem of a fit or a search: a campaign, a model to add effects to, and the distance between them.
+
+It says which recordings the twins of an effect simulate, and how many twins.
+"""
 
 from __future__ import annotations
 
@@ -7,16 +10,29 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from spikecam_env.gap.compare.distance import freedom_of, is_significant, residual, residual_and_misfit
+from spikecam_env.gap.candidates.table import Candidates, candidate
+from spikecam_env.gap.compare.distance import CLEAR, freedom_of, is_significant, residual, residual_and_misfit
 from spikecam_env.gap.compare.prediction import Null, Prediction, law_error, own_variance
 from spikecam_env.gap.fit.hypothesis import Fit, Hypothesis
 from spikecam_env.gap.fit.predict import predict_by_twins, settled_unit, with_drawn_pattern
-from spikecam_env.gap.fit.recordings import recordings_affected
 from spikecam_env.gap.settings import DiagnosisSettings
-from spikecam_env.gap.twins.case import Case
+from spikecam_env.gap.twins.case import Case, refit_recordings
 from spikecam_env.gap.unit.refit import BaseFit
-from spikecam_env.sensor import SensorModel
+from spikecam_env.sensor import CATALOGUE, SensorModel
+from spikecam_env.sensor.effects.identification import Response
 from spikecam_env.types import Floats
+
+CENTRE = ("centre_x", "centre_y")
+"""Parameters that maps of rates show, and a refit of single pixels takes for their own response."""
+
+OF_EVENTS = 3
+"""Twins of a sparse or mixed effect."""
+
+SPARSE_OR_MIXED = (Response.EVENTS, Response.FEW_PIXELS, Response.MIXED)
+"""Responses of which one simulation says little, and a stronger effect no more."""
+
+OF_RANDOM_COURSE = 2 * OF_EVENTS
+"""Twins of an effect of random course: their scatter counts."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -75,6 +91,11 @@ class Problem:
         """((S,) residual, misfit) of a prediction on the recordings to fit."""
         return residual_and_misfit(self.null, self.seen, predicted)
 
+    def fitted_parameters(self, name: str) -> tuple[str, ...]:
+        """Parameters of an effect that are fitted: those that it declares, and in maps of rates its centre."""
+        centre = (p for p in CENTRE if p in CATALOGUE[name].__dataclass_fields__)
+        return (*candidate(name).fitted, *(centre if self.case.rates_only else ()))
+
     def misfit(self, predicted: Prediction | None = None) -> float:
         """Misfit of a prediction on the recordings to fit; default: of the model itself."""
         return self.residual_and_misfit(predicted or self.null.prediction)[1]
@@ -124,3 +145,47 @@ def standing_on(null: Null, predicted: Prediction) -> Null:
     floor = np.sqrt(null.floor**2 + law_error(null, predicted) ** 2 + own_variance(null, predicted))
     freedom = freedom_of(null, predicted)
     return replace(null, mean=predicted.mean, sd=predicted.spread, floor=floor, freedom=freedom, draws=predicted.draws)
+
+
+def twins_of(name: str) -> int:
+    """Number of twins for an effect.
+
+    Several of a sparse one (few events, few random pixels) or a mixed one.  These cannot be simulated stronger to
+    exceed one twin's noise.
+    """
+    return OF_EVENTS if candidate(name).response in SPARSE_OR_MIXED else 1
+
+
+def recordings_affected(case: Case, names: Sequence[str], null: Null, measured: Floats, effect: Floats) -> list[int]:
+    """Recordings to fit on which effects show, or a disagreement is, by index; all where there is none.
+
+    They include those that the refit rests on: it takes up the effects' mean, and the others are judged by it.  Effects
+    that leave steady uniform light alone need only the others, unless the refit rests on one of these.  Maps of rates
+    are not simulated: their twins are fresh units.
+
+    Args:
+        null: the prediction without them.
+        measured: (S,) statistics.
+        effect: (S,) change of the statistics by the effects.
+    """
+    if case.rates_only:
+        return []
+    off = np.maximum(np.abs(effect), np.abs(np.nan_to_num(measured - null.mean)))
+    seen = off > CLEAR * null.noise
+    shows = {k.recording for k, s in zip(null.keys, seen, strict=True) if s}
+    fitted = {i for i, c in enumerate(case.conditions) if c.use == "fit"}
+    which = {i for i in fitted if case.conditions[i].name in shows} or fitted
+    uneven = {i for i in which if case.conditions[i].kind not in ("dark", "flat")}
+    if uneven and not uneven & refit_recordings(case) and Candidates(tuple(names)).only_contrast:
+        return sorted(uneven)
+    return sorted(which | refit_recordings(case))
+
+
+def with_held_out(case: Case, only: Sequence[int]) -> list[int]:
+    """Recordings `only` and the held-out ones: those in motion, and all where a refit can judge them."""
+    held = {i for i, c in enumerate(case.conditions) if c.use != "fit"}
+    if any(case.conditions[i].kind == "picture" for i in held):
+        held |= refit_recordings(case)
+    if not refit_recordings(case) <= {*only, *held}:
+        held = {i for i in held if case.conditions[i].moves}
+    return sorted({*only, *held})

@@ -26,6 +26,7 @@ from spikecam_env.gap.twins.case import Case, twins
 from spikecam_env.gap.twins.simulate import simulate
 from spikecam_env.gap.unit.refit import constrained_refit
 from spikecam_env.sensor import CATALOGUE, SensorModel
+from spikecam_env.sensor.effect_law import law_digest
 from spikecam_env.types import Floats
 
 REFITTED = 3
@@ -40,17 +41,17 @@ def own_templates(case: Case, model: SensorModel, null: Null, names: Sequence[st
     unit = replace(case, base=unit_under(case, model))
     todo = [(n, p) for n in names if not candidate(n).is_pattern for p in template_parameters(n)]
     with ThreadPoolExecutor(case.jobs) as pool:
-        entries = tuple(pool.map(lambda entry: simulated_template(unit, model, null, *entry), todo))
-    return Templates(
-        null.keys,
-        null.noise,
-        null.mean,
-        case.shape,
-        {c.name: c.frames for c in case.conditions},
-        {c.name: c.level for c in case.conditions},
-        {c.name: "flat" for c in case.conditions},
-        entries,
-    )
+        entries = list(pool.map(lambda entry: simulated_template(unit, model, null, *entry), todo))
+    return bank_of(case, null, entries, {c.name: "flat" for c in case.conditions}, ())
+
+
+def bank_of(
+    case: Case, null: Null, entries: Sequence[Template], kinds: dict[str, str], names: Sequence[str]
+) -> Templates:
+    """Templates that were simulated on a case, with its kinds of recordings and the present laws of candidates."""
+    frames, levels = {c.name: c.frames for c in case.conditions}, {c.name: c.level for c in case.conditions}
+    laws = {name: law_digest(CATALOGUE[name]) for name in names}
+    return Templates(null.keys, null.noise, null.mean, case.shape, frames, levels, kinds, tuple(entries), laws)
 
 
 def template_parameters(name: str) -> list[dict[str, float]]:

@@ -22,7 +22,7 @@ from spikecam_env.errors import InputError
 from spikecam_env.gap.candidates.strength import bounded
 from spikecam_env.gap.compare.prediction import Null
 from spikecam_env.gap.fit import standard_case
-from spikecam_env.gap.fit.simulated_templates import severe_template, simulated_template, template_parameters
+from spikecam_env.gap.fit.simulated_templates import bank_of, severe_template, simulated_template, template_parameters
 from spikecam_env.gap.screen.templates import (
     SEVERE,
     Template,
@@ -111,17 +111,7 @@ def entries_of(
 def templates_on(standard: Standard, entries: Sequence[Template], names: Sequence[str]) -> Templates:
     """Entries that were simulated on the standard case as a bank, with the present laws of the candidates."""
     case, _, null = standard
-    return Templates(
-        null.keys,
-        null.noise,
-        null.mean,
-        case.shape,
-        {c.name: c.frames for c in case.conditions},
-        {c.name: c.level for c in case.conditions},
-        {c.name: c.kind for c in case.conditions},
-        tuple(entries),
-        {name: law_digest(CATALOGUE[name]) for name in names},
-    )
+    return bank_of(case, null, entries, {c.name: c.kind for c in case.conditions}, names)
 
 
 def key_of(name: str) -> str:
@@ -141,9 +131,9 @@ def _kept(key: str, name: str) -> Templates | None:
     path = _path(key)
     if key not in _IN_MEMORY and path is not None:
         with suppress(InputError):
-            found = read_templates(path)
-            if found.laws == {name: law_digest(CATALOGUE[name])}:
-                _IN_MEMORY[key] = found
+            stored = read_templates(path)
+            if stored.laws == {name: law_digest(CATALOGUE[name])}:
+                _IN_MEMORY[key] = stored
     return _IN_MEMORY.get(key)
 
 

@@ -67,12 +67,12 @@ def condition_of(recording: CampaignRecording) -> Condition:
 
 def planned_conditions(design: Sequence[Planned], shape: tuple[int, int], frames: int) -> list[Condition]:
     """Conditions of recordings that are planned, not made."""
-    found = []
+    conditions = []
     for p in design:
         light = p.light(shape, frames)
         whole = Keyframes(light.frame, np.broadcast_to(light.radiance, (len(light.frame), *shape)))
-        found.append(_condition(p.file_name, whole, frames, p.use, p.v_d))
-    return found
+        conditions.append(_condition(p.file_name, whole, frames, p.use, p.v_d))
+    return conditions
 
 
 def _condition(name: str, light: Keyframes, frames: int, use: str, v_d: float | None) -> Condition:

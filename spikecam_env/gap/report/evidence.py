@@ -10,6 +10,7 @@ from spikecam_env.gap.result import LABELLED_LIGHT, NOMINAL_LIGHT, Conclusion, E
 from spikecam_env.gap.search.round import Round
 from spikecam_env.gap.twins.case import Case
 from spikecam_env.gap.twins.fresh_units import drawn_response
+from spikecam_env.gap.twins.rate_maps import unit_without_errors
 from spikecam_env.gap.twins.unknown_scene import simulate_seen
 from spikecam_env.gap.unit.refit import BaseFit, constrained_refit, free_refit
 from spikecam_env.gap.verdict.comparison import Comparison
@@ -24,6 +25,28 @@ def evidence_for(comparison: Comparison, rounds: Sequence[Round], conclusion: Co
     changed = model is not tested or conclusion.parameters
     base = constrained_refit(tested, comparison.off.nominal)
     return evidence_of(case, tested, base, *((model, unit) if changed else ()))
+
+
+def evidence_of_maps(comparison: Comparison, rounds: Sequence[Round]) -> Evidence:
+    """Response and dark level of every pixel, measured and of fresh units."""
+    case = comparison.case
+    nothing = (None,) * len(case.conditions)
+    models = [comparison.model, *(r.start.model for r in rounds[-1:])]
+    before, *last = [
+        drawn_response(m, case.base, case.shape, case.seed + case.settings.twins.drawn_units) for m in models
+    ]
+    after = last[0] if last else None
+    return Evidence(
+        conditions=case.conditions,
+        measured=nothing,  # type: ignore[arg-type]
+        before=nothing,  # type: ignore[arg-type]
+        after=nothing if after else None,  # type: ignore[arg-type]
+        free_refit=case.base,
+        before_base=unit_without_errors(*before),
+        after_base=unit_without_errors(*after) if after else None,
+        drawn_before=before,
+        drawn_after=after,
+    )
 
 
 def evidence_of(

@@ -18,9 +18,9 @@ from spikecam_env.gap.result import (
     Diagnosis,
     Gap,
     Remainder,
+    gap_is_fitted,
 )
 from spikecam_env.gap.twins.budget import Budget
-from spikecam_env.gap.verdict.notes import gap_is_fitted
 
 
 def sentence(conclusion: Conclusion, model_name: str) -> str:

@@ -176,8 +176,6 @@ def structure_rows(unknown: Mapping[str, Any] | None) -> Rows:
 def _in_words(key: str, value: Any) -> str:
     if key == "groups":
         return ", ".join(f"{human(group)} {percent(share)}" for group, share in value.items())
-    if key == "left":
-        return percent(value)
     if key == "best_candidate" and value:
         return human(value)
     return _value(value)
@@ -213,8 +211,5 @@ STRUCTURE = {
     "worst_group": "Group of statistics that is off most",
     "groups": "Share of the deviation, by group of statistics",
     "patch": "Content of the patched model",
-    "left": "Remaining share of the mean square",
-    "found": "Effects that help",
-    "worst": "Largest remaining deviations, in noise",
 }
 """Keys of `Diagnosis.unknown` in words."""

@@ -98,7 +98,7 @@ class RescaledTemplate:
     """(S,) `Response.way`."""
     size: Floats
     """(S,) D, S / B or E at the template's strength; 0 where the template does not clearly show."""
-    here: Floats
+    of_campaign: Floats
     """(S,) mean of the campaign's null model."""
 
     def change(self, strength: float) -> Floats:
@@ -108,7 +108,7 @@ class RescaledTemplate:
         counted = known.share is not None and known.share[0] == known.strength
         more = times ** (1.0 if counted else 2.0) * self.size
         power = np.log(np.maximum(1.0 + more, LEAST_POWER))
-        count = 2.0 * np.sqrt(np.maximum((self.here / 2.0) ** 2 + more, 0.0)) - np.abs(self.here)
+        count = 2.0 * np.sqrt(np.maximum((self.of_campaign / 2.0) ** 2 + more, 0.0)) - np.abs(self.of_campaign)
         ways = {"power": power, "rms": power / 2, "line": np.log(np.maximum(more, 1.0)), "count": count}
         return np.where(self.size == 0, 0.0, np.select([self.way == w for w in ways], list(ways.values()), mean))
 
@@ -146,15 +146,17 @@ def response_of(key: StatisticKey) -> Response:
     return max(of, key=lambda r: r[0])[1] if of else MEAN
 
 
-def size_of(name: str, response: Response, change: float, there: float, here: float, grown: Floats) -> float:
+def size_of(
+    name: str, response: Response, change: float, of_template: float, of_campaign: float, grown: Floats
+) -> float:
     """`RescaledTemplate.size` of one statistic.
 
     Args:
         name: of the effect.
         response: of the statistic.
         change: by the template, on its own campaign.
-        there: mean of the template's null model.
-        here: mean of the campaign's null model.
+        of_template: mean of the template's null model.
+        of_campaign: mean of the campaign's null model.
         grown: (3,) rows, columns and frames of the campaign over the template's.
     """
     factor = float(np.prod(grown ** np.array(response[1:])))
@@ -163,10 +165,10 @@ def size_of(name: str, response: Response, change: float, there: float, here: fl
             return change * float(np.sqrt(factor))
         return change if 1 / SAME_COURSE < grown[2] < SAME_COURSE else 0.0
     if response.way == "count":
-        return factor * (((there + change) / 2) ** 2 - (there / 2) ** 2)
+        return factor * (((of_template + change) / 2) ** 2 - (of_template / 2) ** 2)
     if response.way in ("power", "rms", "line"):
         root = 2.0 if response.way == "rms" else 1.0
-        return factor * float(np.expm1(root * change) * np.exp(root * (there - here)))
+        return factor * float(np.expm1(root * change) * np.exp(root * (of_template - of_campaign)))
     return factor * change if response.way == "mean" else 0.0
 
 
@@ -185,14 +187,17 @@ def same_bands(
     templates: Templates, keys: Sequence[StatisticKey], at: NDArray[np.int64], frames: dict[str, int]
 ) -> NDArray[np.int64]:
     """(S,) index of each statistic in the templates, where a band of a spectrum is that of the nearest frequency."""
-    index, found = {k: i for i, k in enumerate(templates.keys)}, at.copy()
+    index, places_of_bands = {k: i for i, k in enumerate(templates.keys)}, at.copy()
     for i, key in enumerate(keys):
         if at[i] >= 0 and key.group == "spectrum" and key.name.startswith("band"):
             other = templates.keys[at[i]]
-            here, there = log_middles(frames[key.recording]), log_middles(templates.frames[other.recording])
-            nearest = int(np.argmin(np.abs(there - here[int(key.name.split()[1])])))
-            found[i] = index.get(other._replace(name=f"band {nearest}"), -1)
-    return np.asarray(found)
+            of_campaign, of_template = (
+                log_middles(frames[key.recording]),
+                log_middles(templates.frames[other.recording]),
+            )
+            nearest = int(np.argmin(np.abs(of_template - of_campaign[int(key.name.split()[1])])))
+            places_of_bands[i] = index.get(other._replace(name=f"band {nearest}"), -1)
+    return np.asarray(places_of_bands)
 
 
 @cache

@@ -91,8 +91,8 @@ def _in_proportion(entry: Template, null: Null, d: Floats, shift: Floats) -> Scr
         return None
     strength, power = CATALOGUE[entry.name].strength, candidate(entry.name).power
     wider = 1.0 + scale**2 * own2 + (2 * TOLERANCE * scale * shift) ** 2
-    there = entry.parameters[strength] * np.sign(scale) * abs(scale) ** (1 / power)
-    start = bounded(entry.name, {**entry.parameters, strength: there})
+    scaled = entry.parameters[strength] * np.sign(scale) * abs(scale) ** (1 / power)
+    start = bounded(entry.name, {**entry.parameters, strength: scaled})
     white = 1.0 / (1.0 + abs(scale) * (1.0 / entry.white - 1.0))
     return Screened(entry.name, start, misfit_of(null, d - scale * shift, wider), scale * shift * null.noise, white)
 

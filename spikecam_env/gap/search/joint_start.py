@@ -1,8 +1,15 @@
-"""Two effects of which neither shows alone, fitted at once from a grid of starts.
+"""Two effects of which neither is found alone, fitted at once.
 
 An edge of the array's clock gathers pixels in every row.  It shows as late and early spikes in rows that are read at
 its moment.  In a static scene a rolling read-out shows by the edge alone, and the edge without it fits few rows.  An
 effect declares its partner, and the values of their parameters to start from (`start_with`).
+
+Two bends cancel: a dead time and a non-linearity of the other sign leave the mean rate alone to first order.
+
+    x (1 + tau x) / (1 + tau x (1 + tau x)) = x (1 - (tau x)^2 + ...)        of each alone a part in tau x
+
+The best fit of one alone stands in for the second order, and is far smaller than either.  The change by both goes with
+the square of their strength, so one twin of both gives the strength.
 """
 
 from __future__ import annotations
@@ -14,21 +21,27 @@ from itertools import product
 
 import numpy as np
 
-from spikecam_env.gap.candidates.strength import bounded, with_effect
+from spikecam_env.gap.candidates.strength import MOST_EXTRAPOLATED, bounded, with_effect
 from spikecam_env.gap.candidates.table import LACKING, candidate
 from spikecam_env.gap.compare.prediction import with_change_scaled
 from spikecam_env.gap.compare.step import scale_to
-from spikecam_env.gap.fit.candidate import LARGEST_FACTOR
-from spikecam_env.gap.fit.gauss_newton import COMPARED, descend, probe_of
+from spikecam_env.gap.fit.candidate import LARGEST_FACTOR, ROUND_OFF, where_ended
+from spikecam_env.gap.fit.gauss_newton import COMPARED, MOST_STEPS, descend, probe_of
 from spikecam_env.gap.fit.hypothesis import Fit
 from spikecam_env.gap.fit.problem import Problem
-from spikecam_env.gap.fit.shapes import where_ended
 from spikecam_env.gap.search.round import Round
+from spikecam_env.gap.unit.indirect_inference import extrapolated_unit
 from spikecam_env.gap.unit.refit import constrained_refit
-from spikecam_env.sensor import CATALOGUE
+from spikecam_env.sensor import CATALOGUE, SensorModel
 
 DESCENTS = 2
 """Starts of two effects that start jointly, from which both are fitted."""
+
+
+CANCELLING = ("dead_time", "photo_response_nonlinearity")
+
+START_US = 1.0
+"""Dead time [us] of the first twin of both."""
 
 
 @dataclass(frozen=True)
@@ -107,3 +120,44 @@ def one_by_one(turn: Round) -> list[Round]:
         start = replace(turn.start, model=best.model.without(name))
         rounds.append(replace(turn, start=start, fits=(own,), rivals=()))
     return rounds
+
+
+def fit_cancelling_pair(problem: Problem, names: Collection[str]) -> Fit | None:
+    """Fit two bends that cancel at once, by one strength.
+
+    Args:
+        problem: the problem before any effect was added.
+
+    Returns:
+        A fit of the dead time whose model has both.  None if the strength has the wrong sign, or if one of them is no
+        candidate.
+    """
+    if not set(CANCELLING) <= set(names):
+        return None
+    frame_rate_hz = problem.case.frame_rate_hz
+    only = problem.affected(CANCELLING)
+    tau_us = START_US
+    bare = base = constrained_refit(
+        with_both(problem.model, tau_us, frame_rate_hz), constrained_refit(problem.model, problem.case.base)
+    )
+    for _ in range(MOST_STEPS):
+        model = with_both(problem.model, tau_us, frame_rate_hz)
+        predicted = problem.predict(model, base, 1, only)
+        base = problem.settled_unit(model, base, predicted)
+        square, _ = scale_to(problem.null, problem.seen, predicted)
+        if square <= 0:
+            return None
+        factor = float(np.clip(np.sqrt(square), 1 / MOST_EXTRAPOLATED, MOST_EXTRAPOLATED))
+        base, tau_us = extrapolated_unit(bare, base, factor**2, MOST_EXTRAPOLATED), tau_us * factor
+        if ROUND_OFF[0] < factor < ROUND_OFF[1]:
+            break
+    predicted = with_change_scaled(problem.null, predicted, factor**2)
+    model = with_both(problem.model, tau_us, frame_rate_hz)
+    return problem.fit_of(CANCELLING[0], {"tau_us": tau_us}, model, base, predicted)
+
+
+def with_both(model: SensorModel, tau_us: float, frame_rate_hz: float) -> SensorModel:
+    """The model with a dead time and the non-linearity that cancels it."""
+    beta = -tau_us * 1e-6 * frame_rate_hz
+    bent = with_effect(model, CANCELLING[0], bounded(CANCELLING[0], {"tau_us": tau_us}))
+    return with_effect(bent, CANCELLING[1], bounded(CANCELLING[1], {"beta": beta}))

@@ -21,16 +21,15 @@ import numpy as np
 
 from spikecam_env.gap.candidates.table import candidate
 from spikecam_env.gap.compare.distance import is_significant, residual
-from spikecam_env.gap.fit.candidate import fit
+from spikecam_env.gap.fit.candidate import WORTH, fit, with_fitted_shapes
 from spikecam_env.gap.fit.confirm import confirmed, no_more_certain, resettled, with_prediction
 from spikecam_env.gap.fit.hypothesis import Fit
-from spikecam_env.gap.fit.joint import refined_together
+from spikecam_env.gap.fit.joint import no_smaller, refined_together
 from spikecam_env.gap.fit.last_step import Errors
 from spikecam_env.gap.fit.problem import Problem
-from spikecam_env.gap.fit.shapes import WORTH, with_fitted_shapes
 from spikecam_env.gap.screen.screen import Screened
-from spikecam_env.gap.search.cancelling_pair import PAIR, fit_pair
 from spikecam_env.gap.search.choice import chosen_of, confirmed_in_order, margin_of
+from spikecam_env.gap.search.joint_start import CANCELLING, fit_cancelling_pair, one_by_one
 from spikecam_env.gap.search.round import SAME_SHARE, Round
 from spikecam_env.gap.search.shortlist import fit_from, may_be_shaped, recordings_of
 from spikecam_env.types import Floats
@@ -217,30 +216,27 @@ def try_cancelling_pair(problem: Problem, names: Sequence[str], rounds: list[Rou
         return rounds
     if not problem.allows("two nonlinearities that cancel", needed=True):
         return rounds
-    fitted = fit_pair(problem, names)
+    fitted = fit_cancelling_pair(problem, names)
     if fitted is None or fitted.misfit > last.misfit:
         return rounds
-    fitted, errors, used_held_out = refined_together(problem, fitted, PAIR)
+    fitted, errors, used_held_out = refined_together(problem, fitted, CANCELLING)
     if fitted.misfit > last.misfit - problem.settings.deviance.accept:
         return rounds
-    one, other = (fitted.parameters_of(name) for name in PAIR)
-    alone = replace(fitted, name=PAIR[0], parameters={"tau_us": one["tau_us"]}, sd=errors[PAIR[0]])
-    fitted = replace(fitted, parameters={"beta": other["beta"]}, sd=errors[PAIR[1]])
-    first = replace(first, margin=(last.misfit - fitted.misfit) / (first.start.misfit - fitted.misfit))
-    between = replace(
+    both = replace(
         first,
-        start=replace(first.start, model=fitted.model.without(PAIR[1])),
-        fits=(fitted,),
+        fits=(fitted, *(f for f in first.fits if f.name != fitted.name)),
         rivals=(),
+        margin=(last.misfit - fitted.misfit) / (first.start.misfit - fitted.misfit),
         used_held_out=used_held_out,
         motion_alone=any(r.motion_alone for r in rounds),
     )
-    rest = [f for f in first.fits if f.name != PAIR[0]]
-    return [
-        replace(first, fits=(alone, *rest), rivals=()),
-        between,
-        Round(fitted),
-    ]
+    return [*(with_errors(r, errors) for r in one_by_one(both)), Round(fitted)]
+
+
+def with_errors(turn: Round, errors: Errors) -> Round:
+    """The round with its effect's errors from the last joint fit."""
+    best = turn.fits[0]
+    return replace(turn, fits=(replace(best, sd=no_smaller(errors.get(best.name, {}), best.sd)), *turn.fits[1:]))
 
 
 # ---- more draws of the same

@@ -11,8 +11,9 @@ import numpy as np
 from spikecam_env.gap.candidates.table import candidate, expected_events
 from spikecam_env.gap.compare.distance import is_significant
 from spikecam_env.gap.compare.prediction import Null
+from spikecam_env.gap.fit.candidate import WORTH
 from spikecam_env.gap.fit.hypothesis import Fit, Hypothesis
-from spikecam_env.gap.fit.shapes import WORTH
+from spikecam_env.gap.fit.problem import Problem
 from spikecam_env.gap.settings import Deviance
 from spikecam_env.gap.twins.case import Case
 from spikecam_env.sensor import SensorModel
@@ -91,33 +92,41 @@ def absent(case: Case, given: SensorModel, model: SensorModel) -> set[str]:
     return {
         name
         for name, parameters in added.items()
-        if parameters[candidate(name).strength] == 0
-        or expected_events(name, parameters, case.conditions, case.observations) < LEAST_EVENTS
+        if parameters[candidate(name).strength] == 0 or expected_events(name, parameters, case) < LEAST_EVENTS
     }
 
 
-def is_improvement(null: Null, before: float, best: Fit, later: bool, weak: bool = False) -> bool:
-    """Whether a joint fit of all effects is an improvement: it leaves less misfit by `Deviance.accept`.
+def is_improvement(problem: Problem, before: float, turn: Round, best: Fit, later: bool) -> bool:
+    """Whether a joint fit of all effects is an improvement, and its newest effect does something.
+
+    It leaves less misfit by `Deviance.accept`.  A fit of several effects that leaves nothing significant may leave as
+    much; one whose newest effect removes less than that by itself has to leave nothing.
 
     Args:
+        problem: the model as given.
         before: misfit without the newest effect, which other twins would change by some ten.
+        turn: the round of the newest effect.
         best: the joint fit.
-        later: whether there were effects before.  Such a fit, where it leaves nothing significant, may leave as much.
-        weak: whether the newest effect removed less than `Deviance.accept` by itself.  Such a fit has to leave nothing.
+        later: whether there were effects before.
     """
-    explained = later and not is_significant(null, best.rho, best.prediction)
-    if weak and not explained:
-        return False
-    return before - best.misfit >= (0.0 if explained else null.settings.deviance.accept)
+    accept = problem.settings.deviance.accept
+    explained = later and not is_significant(problem.null, best.rho, best.prediction)
+    is_weak = turn.start.misfit - turn.fits[0].misfit < accept
+    enough = before - best.misfit >= (0.0 if explained else accept) and (explained or not is_weak)
+    return enough and best.name not in absent(problem.case, problem.model, best.model)
 
 
-def is_small_share(turn: Round, left: float, chance: float, later: bool) -> bool:
-    """Whether a misfit is little less than at the start of a round, as a stand-in's is.
+def is_stand_in(problem: Problem, last: Round, best: Fit, chance: float, later: bool) -> bool:
+    """Whether the first effect, or a second bend, removes little and leaves something: it may stand for another.
 
     Args:
-        left: the misfit.
+        problem: the model as given.
+        last: the effect's round.
+        best: its fit.
         chance: misfit of noise alone.
-        later: whether there are earlier effects.
+        later: whether there are effects before it.
     """
-    least = WORTH if later else 1 - SAME_SHARE
-    return turn.start.misfit - left < least * (turn.start.misfit - chance)
+    if later and not is_second_bend(last, best):
+        return False
+    least = (WORTH if later else 1 - SAME_SHARE) * (last.start.misfit - chance)
+    return last.start.misfit - best.misfit < least and is_significant(problem.null, best.rho, best.prediction)

@@ -11,17 +11,16 @@ import numpy as np
 from spikecam_env.gap.candidates.table import acting_through, candidate
 from spikecam_env.gap.compare.distance import SHOWS
 from spikecam_env.gap.compare.prediction import Null
-from spikecam_env.gap.fit.candidate import fit
+from spikecam_env.gap.fit.candidate import WORTH, fit, with_fitted_shapes, with_shapes_to_fit
 from spikecam_env.gap.fit.hypothesis import Fit
-from spikecam_env.gap.fit.problem import Problem
-from spikecam_env.gap.fit.recordings import twins_of
-from spikecam_env.gap.fit.shapes import WORTH, with_fitted_shapes, with_shapes_to_fit
+from spikecam_env.gap.fit.problem import Problem, twins_of
 from spikecam_env.gap.fit.simulated_templates import own_templates
 from spikecam_env.gap.screen.screen import Screened, screen
 from spikecam_env.gap.screen.templates import Templates
 from spikecam_env.gap.settings import Searching
 from spikecam_env.gap.statistics.spectrum import frequency, spectrum, strongest_line
 from spikecam_env.gap.twins.case import Case
+from spikecam_env.sensor import CATALOGUE
 from spikecam_env.sensor.effects.identification import Response
 from spikecam_env.types import Floats
 
@@ -44,15 +43,18 @@ def line_of(case: Case) -> float | None:
     return frequency(frame, at) * case.frame_rate_hz if ratio > LINE else None
 
 
-def screened_beside(here: Problem, names: Sequence[str], templates: Templates) -> list[Screened]:
+def screened_beside(here: Problem, names: Sequence[str], templates: Templates | None) -> list[Screened]:
     """Candidates by the misfit that their templates leave, the best first.
 
     Candidates that act through an effect of the model get templates that are simulated on this campaign.
 
     Args:
         here: the problem, with the effects before.
+        templates: None for maps of rates, whose candidates all start from their defaults.
     """
     null, shown = here.null, here.case.conditions
+    if templates is None:
+        return [Screened(n, CATALOGUE[n]().parameters(), here.misfit(), np.zeros(len(null.keys))) for n in names]
     screened = screen(templates, shown, null, here.seen, names, line_of(here.case))
     if through := acting_through(names, here.model, shown):
         own = own_templates(here.case, here.model, null, through)
@@ -88,7 +90,7 @@ def starts_to_fit(
     once = [s for s in screened if s.misfit < enough or not takes_several_twins(s.name)]
     best = once[: searching.most_fitted]
     tried = [s for i, s in enumerate(best) if i < FEWEST_FITTED or s.misfit < enough]
-    also = [s for s in screened if candidate(s.name).is_pattern] if "pattern" in groups else []
+    also = [s for s in screened if candidate(s.name).is_pattern] if {"pattern", "texture"} & set(groups) else []
     if {"moving", "step"} & set(groups):
         also += [s for s in shapes if candidate(s.name).of_motion]
     return tried + [s for s in also if s not in tried]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from typing import NamedTuple
 
 from spikecam_env.gap.observe.conditions import LABEL_ERROR
@@ -84,22 +84,25 @@ class StatisticKey(NamedTuple):
 
 def statistics_bank(reading: CampaignReading) -> dict[StatisticKey, float]:
     """Every statistic of a campaign, but for those of the pattern."""
-    found = {}
+    bank: dict[StatisticKey, float] = {}
     for i, condition in enumerate(reading.conditions):
         for group, statistics in GROUPS.items():
-            for name, value in statistics(reading, i).items():
-                found[StatisticKey(group, condition.name, name)] = value
-    return found
+            bank |= keyed(group, condition.name, statistics(reading, i))
+    return bank
+
+
+def keyed(group: str, recording: str, values: Mapping[str, float]) -> dict[StatisticKey, float]:
+    """Statistics of one recording in one group, by key."""
+    return {StatisticKey(group, recording, name): value for name, value in values.items()}
 
 
 def pattern_bank(reading: CampaignReading) -> dict[StatisticKey, float]:
     """The pattern statistics of a measurement's rate maps: of the dark recording and of every flat."""
-    found = {}
+    bank: dict[StatisticKey, float] = {}
     for condition, o in zip(reading.conditions, reading.observations, strict=True):
         if condition.kind in ("dark", "flat"):
-            for name, value in pattern.statistics(o.rate.reshape(o.shape)).items():
-                found[StatisticKey("pattern", condition.name, name)] = value
-    return found
+            bank |= keyed("pattern", condition.name, pattern.statistics(o.rate.reshape(o.shape)))
+    return bank
 
 
 __getattr__ = old_names(__name__, {"Key": "StatisticKey"})

@@ -50,17 +50,17 @@ def statistics(reading: CampaignReading, i: int) -> dict[str, float]:
     off = np.where(good, interval - np.round(interval), np.inf)
     ideal = ideal_second_difference(np.array(DIFFERENCES), interval[:, None])
     excess = o.times.square - o.times.terms * ideal
-    found = {}
+    values = {}
     for b, band in enumerate(bands(o.shape, o.frames)):
-        found[f"whole {b}"] = root(float((band & (np.abs(off) < AT_WHOLE)).sum()))
+        values[f"whole {b}"] = root(float((band & (np.abs(off) < AT_WHOLE)).sum()))
         late, early = o.flips[band & good].sum(axis=0)
-        found[f"late {b}"], found[f"early {b}"] = root(float(late)), root(float(early))
+        values[f"late {b}"], values[f"early {b}"] = root(float(late)), root(float(early))
         parts = {"below": (off < 0) & (off > -BESIDE_WHOLE), "above": (off >= 0) & (off < BESIDE_WHOLE)}
         for name, part in parts.items():
-            found |= _mean(o, excess, band & part, 0, f"A_{DIFFERENCES[0]} {name} {b}")
+            values |= _mean(o, excess, band & part, 0, f"A_{DIFFERENCES[0]} {name} {b}")
     for j, k in enumerate(DIFFERENCES):
-        found |= _mean(o, excess, good & (np.abs(off) >= BESIDE_WHOLE), j, f"A_{k} between")
-    return found
+        values |= _mean(o, excess, good & (np.abs(off) >= BESIDE_WHOLE), j, f"A_{k} between")
+    return values
 
 
 def bands(shape: tuple[int, int], frames: int) -> list[Masks]:

@@ -45,16 +45,16 @@ def statistics(reading: CampaignReading, i: int) -> dict[str, float]:
         return {}
     relative = total / total.mean() - 1.0
     t = np.linspace(-1.0, 1.0, len(total))
-    found = {"trend": slope(relative, t), "bend": slope(relative, t**2)}
-    left = relative - found["trend"] * t - found["bend"] * (t**2 - np.mean(t**2))
-    found["wander"] = log(float(np.mean(left**2)), 1e-14)
+    values = {"trend": slope(relative, t), "bend": slope(relative, t**2)}
+    left = relative - values["trend"] * t - values["bend"] * (t**2 - np.mean(t**2))
+    values["wander"] = log(float(np.mean(left**2)), 1e-14)
     own = blocks[:, reading.base.live].astype(np.float64)
     common = own.mean(axis=0) * (1.0 + relative[:, None])  # without it, a lamp that drifts would count twice
     variance = np.mean((own - common) ** 2, axis=0)
-    found["pixels"] = log(float(variance.mean()), 1e-6)
+    values["pixels"] = log(float(variance.mean()), 1e-6)
     most = np.sort(variance)[-max(variance.size // 50, 1) :].mean()  # counts are whole: a quantile of them would jump
-    found["pixel tail"] = log(float(most / max(variance.mean(), 1e-6)), 1e-6)
-    return found | (lateness(o) if reading.conditions[i].kind == "dark" else {})
+    values["pixel tail"] = log(float(most / max(variance.mean(), 1e-6)), 1e-6)
+    return values | (lateness(o) if reading.conditions[i].kind == "dark" else {})
 
 
 def lateness(o: ObservedRecording) -> dict[str, float]:

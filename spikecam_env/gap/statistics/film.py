@@ -37,12 +37,12 @@ class FilmFeatures:
 
 def films(conditions: Sequence[Condition], shape: tuple[int, int]) -> dict[str, FilmFeatures]:
     """The film of every recording with moving light, computed once."""
-    found = {}
+    features = {}
     for c in conditions:
         if c.kind == "moving" and c.light is not None:
             light = light_film(c.light, c.frames)
-            found[c.name] = FilmFeatures(light, *film_features(light, shape))
-    return found
+            features[c.name] = FilmFeatures(light, *film_features(light, shape))
+    return features
 
 
 def light_film(light: Keyframes, frames: int) -> Pictures:

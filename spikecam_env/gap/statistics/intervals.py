@@ -21,9 +21,9 @@ def statistics(reading: CampaignReading, i: int) -> dict[str, float]:
     if reading.conditions[i].kind not in STEADY:
         return {}
     o = reading.observations[i]
-    found = {"short": root(o.short[reading.base.live].sum()), "long": root(o.long[reading.base.live].sum())}
+    values = {"short": root(o.short[reading.base.live].sum()), "long": root(o.long[reading.base.live].sum())}
     fastest = 1.0 / max(float(np.quantile(reading.expected(i)[reading.base.live], 0.999)), 1e-4)
     for n in (1, 2, 3, 4, 6, 8):
         if n < 0.5 * fastest:
-            found[f"length {n}"] = root(float(o.lengths[n - 1]))
-    return found
+            values[f"length {n}"] = root(float(o.lengths[n - 1]))
+    return values

@@ -30,6 +30,6 @@ def statistics(reading: CampaignReading, i: int) -> dict[str, float]:
     flat = left.reshape(-1)
     share = film.basis @ flat
     rest = flat - share @ film.basis
-    found = {name: float(s / n) for name, s, n in zip(FEATURES, share, film.size, strict=True) if n > 1e-6}
-    found["left"] = float(np.log(max(float(np.sqrt(np.mean(rest**2))), 1e-9)))
-    return found
+    values = {name: float(s / n) for name, s, n in zip(FEATURES, share, film.size, strict=True) if n > 1e-6}
+    values["left"] = float(np.log(max(float(np.sqrt(np.mean(rest**2))), 1e-9)))
+    return values

@@ -13,11 +13,11 @@ def statistics(reading: CampaignReading, i: int) -> dict[str, float]:
         return {}
     o = reading.observations[i]
     rate = (o.times.count / o.frames).reshape(o.shape)
-    found = {}
+    values = {}
     for axis, name in enumerate(("across", "down")):
         chance = float((rate[:, 1:] * rate[:, :-1]).sum() if axis == 0 else (rate[1:] * rate[:-1]).sum())
         for lag in range(FRAME_LAGS):
             expected = 2.0 * chance * (o.frames - lag)
             if expected > 200:
-                found[f"{name} {lag}"] = float(o.coincidences[lag, axis] / expected - 1.0)
-    return found
+                values[f"{name} {lag}"] = float(o.coincidences[lag, axis] / expected - 1.0)
+    return values

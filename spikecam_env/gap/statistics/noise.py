@@ -33,7 +33,7 @@ def statistics(reading: CampaignReading, i: int) -> dict[str, float]:
         return {}
     fraction = interval % 1.0
     excess = (o.variance - fraction * (1.0 - fraction))[good]
-    found = {
+    values = {
         "variance": float(
             np.mean(np.clip(excess / interval[good], *np.quantile(excess / interval[good], [0.01, 0.99])))
         ),
@@ -49,7 +49,7 @@ def statistics(reading: CampaignReading, i: int) -> dict[str, float]:
         ratio = o.times.square[with_terms, j] / (terms[with_terms] * law)
         weight = np.minimum(terms[with_terms], 200)
         top = np.quantile(ratio, 0.995)
-        found[f"A_{k}"] = float((weight * np.minimum(ratio, top)).sum() / weight.sum() - 1.0)
+        values[f"A_{k}"] = float((weight * np.minimum(ratio, top)).sum() / weight.sum() - 1.0)
         if k == 16:
-            found["tail"] = log(float(np.quantile(ratio, 0.99) / max(np.median(ratio), 1e-6)))
-    return found
+            values["tail"] = log(float(np.quantile(ratio, 0.99) / max(np.median(ratio), 1e-6)))
+    return values

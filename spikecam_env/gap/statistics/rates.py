@@ -30,15 +30,15 @@ def statistics(reading: CampaignReading, i: int) -> dict[str, float]:
     if known.sum() < 100:
         return {}
     r = np.clip(residual[known], *np.quantile(residual[known], [0.005, 0.995]))
-    found = {"level": float(r.mean())}
+    values = {"level": float(r.mean())}
     x = reading.expected(i)[known]
     if condition.kind != "dark":
-        found["slope"] = slope(r, x / x.mean())
-        found["scatter"] = log(float(np.sqrt(np.mean((r - r.mean()) ** 2))))
+        values["slope"] = slope(r, x / x.mean())
+        values["scatter"] = log(float(np.sqrt(np.mean((r - r.mean()) ** 2))))
         rows, columns = reading.observations[i].shape
         half = (np.arange(rows) >= rows // 2)[:, None] * 2 + (np.arange(columns) >= columns // 2)[None, :]
         quarter = half.reshape(-1)[known]
         for q, name in enumerate(("top-left", "top-right", "bottom-left", "bottom-right")):
             if np.any(quarter == q):
-                found[f"{name} corner"] = float(r[quarter == q].mean() - r.mean())
-    return found
+                values[f"{name} corner"] = float(r[quarter == q].mean() - r.mean())
+    return values

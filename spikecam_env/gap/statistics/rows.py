@@ -16,11 +16,11 @@ def statistics(reading: CampaignReading, i: int) -> dict[str, float]:
     o = reading.observations[i]
     if o.frame.sum() < 500:
         return {}
-    found = {}
+    values = {}
     for name, lines in (("row", o.row), ("column", o.column)):
         for n in (1, 16):
-            found[f"{name} {n}"] = log(_common_variance(lines, n), 1e-9)
-    return found
+            values[f"{name} {n}"] = log(_common_variance(lines, n), 1e-9)
+    return values
 
 
 def _common_variance(lines: NDArray[np.int32], frames: int) -> float:

@@ -56,9 +56,9 @@ def statistics(reading: CampaignReading, i: int) -> dict[str, float]:
         return {}
     power = spectrum(o.frame)
     edges = bands(o.frames)
-    found = {f"band {n}": log(float(power[a:b].mean())) for n, (a, b) in enumerate(itertools.pairwise(edges))}
-    found["line"] = log(strongest_line(power)[1])
-    return found
+    values = {f"band {n}": log(float(power[a:b].mean())) for n, (a, b) in enumerate(itertools.pairwise(edges))}
+    values["line"] = log(strongest_line(power)[1])
+    return values
 
 
 def strongest_line(power: Floats) -> tuple[int, float]:

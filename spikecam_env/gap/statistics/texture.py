@@ -46,20 +46,20 @@ def statistics(rate: Floats) -> dict[str, float]:
     around = scipy.ndimage.uniform_filter(clipped, _WINDOW, mode="nearest")
     grain = relative - around
     width = max(scatter(grain), 1e-9)
-    found = {"fine": log(width), "smooth": log(float(around.std()))}
+    values = {"fine": log(width), "smooth": log(float(around.std()))}
     for q in (0.001, 0.01, 0.99, 0.999):
-        found[f"grain {q:g}"] = log(abs(float(np.quantile(grain, q))) / width)
+        values[f"grain {q:g}"] = log(abs(float(np.quantile(grain, q))) / width)
     inside = np.clip(relative, -6 * width, 6 * width)
     inside = inside - inside.mean()
     for r, rows in enumerate(np.array_split(inside, FIELDS_A_SIDE)):
         for c, part in enumerate(np.array_split(rows, FIELDS_A_SIDE, axis=1)):
-            found[f"field {r} {c}"] = float(part.mean())
+            values[f"field {r} {c}"] = float(part.mean())
     variance = max(float(np.mean(inside**2)), 1e-18)
     for n in DISTANCES:
         if min(rate.shape) > 2 * n:
-            found[f"across {n}"] = float((inside[:, n:] * inside[:, :-n]).mean()) / variance
-            found[f"down {n}"] = float((inside[n:] * inside[:-n]).mean()) / variance
+            values[f"across {n}"] = float((inside[:, n:] * inside[:, :-n]).mean()) / variance
+            values[f"down {n}"] = float((inside[n:] * inside[:-n]).mean()) / variance
     least = 0.02 * middle
     for q, value in zip(QUANTILES, np.quantile(rate, QUANTILES), strict=True):
-        found[f"q {q:g}"] = log(max(float(value), least) / middle)
-    return found
+        values[f"q {q:g}"] = log(max(float(value), least) / middle)
+    return values

@@ -15,6 +15,7 @@ from spikecam_env.gap.statistics import StatisticKey, pattern_bank, statistics_b
 from spikecam_env.gap.statistics.film import FilmFeatures, films
 from spikecam_env.gap.statistics.reading import CampaignReading
 from spikecam_env.gap.twins.budget import Budget
+from spikecam_env.gap.twins.fresh_units import drawn_banks
 from spikecam_env.gap.twins.simulate import FIRST_SEED
 from spikecam_env.gap.twins.unknown_scene import simulate_seen
 from spikecam_env.gap.unit.refit import BaseFit, free_refit
@@ -47,6 +48,16 @@ class Case:
     def scenes_only(self) -> bool:
         """Whether no light is known: response and dark level cannot be distinguished from the scene."""
         return not any(c.kind in STEADY_KNOWN for c in self.conditions)
+
+    @property
+    def rates_only(self) -> bool:
+        """Whether recordings are maps of rates, without spikes (`rate_maps`)."""
+        return not self.observations
+
+    def drawn_banks(self, model: SensorModel, count: int) -> list[dict[StatisticKey, float]]:
+        """Statistics of the pattern of fresh units (`fresh_units.drawn_banks`)."""
+        limits = self.settings.unit.spread_limits
+        return drawn_banks(model, self.base, self.conditions, self.shape, count, self.seed, limits)
 
     def use(self, recording: str) -> str:
         """`fit` or `holdout`."""

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
 
 from spikecam_env.gap.observe.conditions import Condition
-from spikecam_env.gap.statistics import StatisticKey, pattern
+from spikecam_env.gap.statistics import StatisticKey, keyed, pattern
 from spikecam_env.gap.unit.false_spikes import read_with_false_spikes
 from spikecam_env.gap.unit.refit import BaseFit, responds
 from spikecam_env.gap.unit.traps import drawn_traps, trap_level
@@ -47,28 +47,33 @@ def drawn_banks(
     """
     fitted = model
     for _ in range(2):
-        fitted = _rescaled(fitted, model, base, shape, seed, limits)
+        factors = {
+            part: spread_factor(fitted, part, width(getattr(base, part)[base.live]), shape, seed)
+            for part in SPREAD_PARAMETERS
+        }
+        fitted = with_spreads_scaled(fitted, model, factors, limits)
     return [_pattern_statistics(fitted, base, shown, shape, seed + n) for n in range(count)]
 
 
-def _rescaled(
-    model: SensorModel,
-    nominal: SensorModel,
-    base: BaseFit,
-    shape: tuple[int, int],
-    seed: int,
-    limits: tuple[float, float],
+def with_spreads_scaled(
+    model: SensorModel, nominal: SensorModel, factors: Mapping[str, float], limits: tuple[float, float]
 ) -> SensorModel:
-    out = model
-    for part, spreads in SPREAD_PARAMETERS.items():
-        factor = spread_factor(model, part, width(getattr(base, part)[base.live]), shape, seed)
+    """The model with its own spreads multiplied, within limits times those of a nominal model.
+
+    Args:
+        factors: by property of the unit (`SPREAD_PARAMETERS`).
+        limits: least and largest multiple of a nominal spread.
+    """
+    scaled = model
+    for part, factor in factors.items():
         for effect in model.effects:
-            if effect.name in spreads:
-                key = spreads[effect.name]
+            if effect.name in SPREAD_PARAMETERS[part]:
+                key = SPREAD_PARAMETERS[part][effect.name]
                 first = next(e for e in nominal.effects if e.name == effect.name).parameters()[key]
-                value = float(np.clip(effect.parameters()[key] * factor, limits[0] * first, limits[1] * first))
-                out = out.with_effect(replace(effect, **{key: value}))
-    return out
+                value = np.clip(effect.parameters()[key] * factor, limits[0] * first, limits[1] * first)
+                value = float(np.clip(value, *type(effect).__dataclass_fields__[key].metadata["bounds"]))
+                scaled = scaled.with_effect(replace(effect, **{key: value}))
+    return scaled
 
 
 def spread_factor(model: SensorModel, part: str, wanted: float, shape: tuple[int, int], seed: int) -> float:
@@ -104,7 +109,7 @@ def _pattern_statistics(
     gain, dark = drawn_response(model, base, shape, seed)
     charge = drawn_traps(model, shape, seed)
     rng, phases, false = (np.random.default_rng([seed, n]) for n in (1, 2, 3))
-    found = {}
+    bank: dict[StatisticKey, float] = {}
     for c in shown:
         if c.kind not in ("dark", "flat") or c.light is None:
             continue
@@ -116,6 +121,5 @@ def _pattern_statistics(
         read = np.clip(rate * (1.0 + noise * rng.standard_normal(rate.size)), 0.0, 1.0)
         read = np.where(count > 1, read, count / c.frames)  # as `ObservedRecording.rate`: one spike has no interval
         read = read_with_false_spikes(model, read, rate, phase, c.frames, false)
-        for name, value in pattern.statistics(read.reshape(shape)).items():
-            found[StatisticKey("pattern", c.name, name)] = value
-    return found
+        bank |= keyed("pattern", c.name, pattern.statistics(read.reshape(shape)))
+    return bank

@@ -47,6 +47,9 @@ OVERSHOOT = 1.2
 LARGEST_SCALING = 40.0
 """Factor by which statistics are made larger or smaller at once, on the way to a score."""
 
+CAMPAIGNS_FOR_BOUNDS = 150
+"""Cost of all simulated bounds [campaigns], by which the budget allows them; measured."""
+
 MORE_EFFORT = "a larger --effort: the budget was spent"
 NO_TEMPLATE = "--bounds simulated: there is no template of it on these recordings"
 """Needed for a bound."""
@@ -86,7 +89,7 @@ def bounds(
         for p in _both_signs(e.name, e.parameters)
     ]
     by_name = dict.fromkeys(e.name for e, _ in starts)
-    expense = case.settings.bounding.campaigns * len(case.conditions)
+    expense = CAMPAIGNS_FOR_BOUNDS * len(case.conditions)
     if kind == "simulated" and not case.budget.allows("upper bounds", expense):
         return [], [(name, MORE_EFFORT) for name in by_name]
     if case.scenes_only and starts:

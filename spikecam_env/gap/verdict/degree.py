@@ -82,8 +82,8 @@ def explanation_of(null: Null, values: Floats, rounds: Sequence[Round]) -> Expla
         return Explanation(EXPLAINS_ALL, every)
     left, after = share_left(null, values, last), in_noise(null, values, last.mean)
     changes = squares_changed(null, rounds)
-    there = sums_by_place(null.keys, np.where(off, after**2, 0.0)) / np.maximum(sums_by_place(null.keys, changes), 1.0)
-    missed = float(np.max(np.where(shows_there(null, changes), there, 0.0)))
+    shares = sums_by_place(null.keys, np.where(off, after**2, 0.0)) / np.maximum(sums_by_place(null.keys, changes), 1.0)
+    missed = float(np.max(np.where(shows_there(null, changes), shares, 0.0)))
     names = right_names(rounds, limits)
     stand_ins = tuple(name for name in every if name not in names)
     degree = LARGEST if stand_ins or left > limits.most_left else EXPLAINS_NEARLY_ALL

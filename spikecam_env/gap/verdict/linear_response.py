@@ -88,7 +88,7 @@ class TemplateProbe(EffectProbe):
 
     def _excess(self, score: Score, change: Floats) -> float:
         """Mean score with a change of the statistics, less that without it."""
-        there = score.of(self.null.mean + change)
+        scored = score.of(self.null.mean + change)
         if candidate(self.name).random_course:  # logarithms of mean squares, which add up
-            return float(np.log1p(np.exp(there) / np.mean(np.exp(score.without))))
-        return there
+            return float(np.log1p(np.exp(scored) / np.mean(np.exp(score.without))))
+        return scored

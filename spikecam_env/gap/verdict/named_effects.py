@@ -12,11 +12,13 @@ from spikecam_env.gap.baseline.missing_from_refit import Missing
 from spikecam_env.gap.candidates.table import candidate
 from spikecam_env.gap.fit.coordinates import interval_of
 from spikecam_env.gap.fit.hypothesis import Fit
-from spikecam_env.gap.result import MOST_CONFIDENCE, Estimate, NamedEffect
+from spikecam_env.gap.result import Estimate, NamedEffect
 from spikecam_env.gap.search.round import Round, absent, adding
-from spikecam_env.gap.verdict.comparison import Comparison
-from spikecam_env.gap.verdict.gap import gap_of
+from spikecam_env.gap.verdict.comparison import Comparison, gap_of
 from spikecam_env.sensor import SensorModel
+
+MOST_CONFIDENCE = 0.99
+"""Confidence in a name without a rival: an effect outside of the catalogue may explain as much."""
 
 
 def patched_model(comparison: Comparison, rounds: Sequence[Round]) -> SensorModel:

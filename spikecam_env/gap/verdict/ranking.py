@@ -8,21 +8,24 @@ import numpy as np
 
 from spikecam_env.gap.candidates.table import candidate
 from spikecam_env.gap.fit.hypothesis import Fit
-from spikecam_env.gap.result import Ranked, why_rejected
+from spikecam_env.gap.result import Ranked
 from spikecam_env.gap.search.round import Round
 from spikecam_env.gap.verdict.named_effects import estimates
 
+LEAST_STATED = 0.05
+"""Misfit that a candidate removes, from which it is stated with one decimal."""
 
-def ranking(rounds: Sequence[Round], found: Sequence[tuple[Fit, Round]], accept: float) -> tuple[Ranked, ...]:
+
+def ranking(rounds: Sequence[Round], kept_fits: Sequence[tuple[Fit, Round]], accept: float) -> tuple[Ranked, ...]:
     """Every fit of every round: the one that was kept, then the others, the smallest misfit first.
 
     Args:
-        found: fits that were kept, with their rounds.
+        kept_fits: fits that were kept, with their rounds.
         accept: reduction in misfit that an effect has to make.
     """
     rows: list[Ranked] = []
     for turn in rounds:
-        kept = turn.fits[:1] if any(turn is of for _, of in found) else ()
+        kept = turn.fits[:1] if any(turn is of for _, of in kept_fits) else ()
         others = sorted(turn.fits[len(kept) :], key=lambda f: f.misfit)
         rows += [ranked(f, turn, accept, accepted=True) for f in kept]
         rows += [ranked(f, turn, accept, accepted=False) for f in others]
@@ -54,3 +57,20 @@ def _reason_against_better(fit: Fit, chosen: Fit) -> str:
         return "smaller misfit in a single simulation; further ones did not confirm it"
     preferred = chosen.name.replace("_", " ")
     return f"smaller misfit, but all recordings together, and the number of parameters, favour {preferred}"
+
+
+def why_rejected(misfit: float, before: float, best: str, needed: float) -> str:
+    """Why a candidate was not added, by its misfit alone.
+
+    Args:
+        misfit: that the candidate leaves.
+        before: misfit that its step started from.
+        best: the candidate that was preferred.
+        needed: misfit that an effect has to remove to be added.
+    """
+    removed = before - misfit
+    if removed < LEAST_STATED:
+        return "explains nothing"
+    if removed < needed:
+        return f"removes {removed:.1f} of the misfit; an effect must remove {needed:g}"
+    return f"larger misfit than {best.replace('_', ' ')}"

@@ -24,7 +24,7 @@ from spikecam_env.gap.compare.step import is_clear
 from spikecam_env.gap.fit.candidate import MOST_TRIES
 from spikecam_env.gap.fit.gauss_newton import at_settled_unit
 from spikecam_env.gap.fit.predict import predict_by_twins, with_drawn_pattern
-from spikecam_env.gap.fit.recordings import OF_RANDOM_COURSE, recordings_affected, twins_of
+from spikecam_env.gap.fit.problem import OF_RANDOM_COURSE, recordings_affected, twins_of
 from spikecam_env.gap.twins.case import Case
 from spikecam_env.gap.unit.indirect_inference import extrapolated_unit
 from spikecam_env.gap.unit.refit import BaseFit, constrained_refit
@@ -38,6 +38,10 @@ CONFIDENCE = 0.95
 
 RULE_OF_THREE = -float(np.log(1.0 - CONFIDENCE))
 """Events expected, 3.0, of which there are none by chance of 1 - CONFIDENCE."""
+
+
+RESOLUTION = 0.6
+"""Least strength that would be refuted, over a simulated bound; a choice, stated on the page."""
 
 
 @dataclass(frozen=True)
@@ -117,11 +121,11 @@ class EffectProbe:
     def __init__(self, case: Case, model: SensorModel, null: Null, name: str):
         self.case, self.model, self.null, self.name = case, model, null, name
         self.settings = case.settings
-        self.resolution = case.settings.bounding.resolution
+        self.resolution = RESOLUTION
 
     def events(self, parameters: Parameters) -> float:
         """Expected number of events of an effect of single events, infinite elsewhere."""
-        return expected_events(self.name, parameters, self.case.conditions, self.case.observations)
+        return expected_events(self.name, parameters, self.case)
 
     def score(self, parameters: Parameters) -> Score | None:
         """The score by the statistics that the effect changes; None where it changes none."""

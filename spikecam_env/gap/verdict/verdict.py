@@ -10,14 +10,12 @@ from typing import Any
 
 import numpy as np
 
-from spikecam_env.gap.baseline.off_nominal import OffNominal, off_nominal, with_strengths
+from spikecam_env.gap.baseline.off_nominal import OffNominal, off_nominal, spreads_off, with_strengths
 from spikecam_env.gap.candidates.table import candidate
 from spikecam_env.gap.compare.distance import adjusted, deviates, residual
-from spikecam_env.gap.compare.prediction import Null
+from spikecam_env.gap.fit.candidate import WORTH
 from spikecam_env.gap.fit.confirm import confirmed
 from spikecam_env.gap.fit.hypothesis import Fit, Hypothesis
-from spikecam_env.gap.fit.problem import Problem
-from spikecam_env.gap.fit.shapes import WORTH
 from spikecam_env.gap.result import (
     EXPLAINS_ALL,
     EXPLAINS_NEARLY_ALL,
@@ -26,16 +24,15 @@ from spikecam_env.gap.result import (
     Conclusion,
     NamedEffect,
     Statistic,
+    notes_of,
 )
-from spikecam_env.gap.search.forward import SECOND
+from spikecam_env.gap.search.forward import CAMPAIGNS_PER_EFFECT, SECOND
 from spikecam_env.gap.search.round import Round
 from spikecam_env.gap.twins.case import Case
 from spikecam_env.gap.unit.refit import BaseFit
-from spikecam_env.gap.verdict.comparison import Comparison
+from spikecam_env.gap.verdict.comparison import Comparison, gap_of, usable_floor
 from spikecam_env.gap.verdict.degree import Explanation, explanation_of
-from spikecam_env.gap.verdict.gap import gap_of, usable_floor
 from spikecam_env.gap.verdict.named_effects import kept, named_by_refit, named_by_search, patched_model
-from spikecam_env.gap.verdict.notes import notes_of
 from spikecam_env.gap.verdict.ranking import ranking
 from spikecam_env.gap.verdict.remainder import remainder_of, squares_left
 from spikecam_env.gap.verdict.structure import structure
@@ -58,25 +55,25 @@ def conclude(comparison: Comparison, rounds: Sequence[Round], floor: float) -> C
     case, null = comparison.case, comparison.null
     last = rounds[-1].start.prediction if rounds else null.prediction
     left = residual(null, comparison.values, last)
-    found = kept(comparison, rounds)
-    by_chance = not rounds or may_be_chance(comparison, found)
+    kept_fits = kept(comparison, rounds)
+    by_chance = not rounds or may_be_chance(comparison, kept_fits)
     explained = Explanation(EXPLAINS_ALL) if by_chance else explanation_of(null, comparison.values, rounds)
     is_clean = explained.degree == EXPLAINS_ALL
-    off = parameters_off(comparison, rounds) if is_clean else {}
-    verdict = verdict_of(comparison, rounds, found, explained.degree) or ("parameter" if off else "none")
+    off = parameters_off(comparison, rounds) if is_clean or case.rates_only else {}
+    verdict = verdict_of(comparison, rounds, kept_fits, explained.degree) or ("parameter" if off else "none")
     model = patched_model(comparison, rounds)
     return Conclusion(
         verdict=verdict,
         degree={"named": explained.degree, "class": explained.degree, "unknown": UNKNOWN}.get(verdict),
-        effects=() if verdict == "unknown" else named(comparison, found, explained),
-        stand_ins=tuple(f.name for f, _ in found if verdict == "unknown" or f.name not in explained.names),
-        unknown=described(comparison, found, explained) if verdict == "unknown" else None,
-        class_=tied(found) if verdict == "class" else None,
+        effects=() if verdict == "unknown" else named(comparison, kept_fits, explained),
+        stand_ins=tuple(f.name for f, _ in kept_fits if verdict == "unknown" or f.name not in explained.names),
+        unknown=described(comparison, kept_fits, explained) if verdict == "unknown" else None,
+        class_=tied(kept_fits) if verdict == "class" else None,
         parameters=off,
-        data=(*(c.text for c in comparison.contradictions), *notes_of([r for _, r in found])),
+        data=(*(c.text for c in comparison.contradictions), *notes_of([r for _, r in kept_fits])),
         gap=gap_of(case, null, comparison.values, comparison.given, last, usable_floor(floor)),
         statistics=statistics_rows(comparison, last.mean, left),
-        ranking=ranking(rounds, found, null.settings.deviance.accept),
+        ranking=ranking(rounds, kept_fits, null.settings.deviance.accept),
         not_testable=comparison.not_testable,
         patched=with_strengths(model, off),
         remainder=remainder_of(case, null, comparison.values, last) if verdict == "named" and not is_clean else None,
@@ -86,7 +83,7 @@ def conclude(comparison: Comparison, rounds: Sequence[Round], floor: float) -> C
 def verdict_of(
     comparison: Comparison,
     rounds: Sequence[Round],
-    found: Sequence[tuple[Fit, Round]],
+    kept_fits: Sequence[tuple[Fit, Round]],
     degree: str,
 ) -> str:
     """The verdict on effects; "" if none is missing.
@@ -96,17 +93,18 @@ def verdict_of(
 
     Args:
         comparison: the measurement beside the null model.
-        found: effects that were kept, with their rounds.
+        kept_fits: effects that were kept, with their rounds.
         degree: one of `DEGREES`.
     """
-    enough = found and degree != UNKNOWN and not second_left_out(comparison.case)
+    enough = kept_fits and degree != UNKNOWN and not second_left_out(comparison.case)
     if comparison.contradictions:
         return "data"
-    if rounds and not may_be_chance(comparison, found) and not enough:
+    unexplained = kept_fits or degree != EXPLAINS_ALL
+    if rounds and unexplained and not may_be_chance(comparison, kept_fits) and not enough:
         return "unknown"
-    if any(r.rivals for _, r in found) and not comparison.missing:
+    if any(r.rivals for _, r in kept_fits) and not comparison.missing:
         return "class" if degree == EXPLAINS_ALL else "unknown"
-    return "named" if found or comparison.missing else ""
+    return "named" if kept_fits or comparison.missing else ""
 
 
 def parameters_off(comparison: Comparison, rounds: Sequence[Round]) -> dict[str, dict[str, float]]:
@@ -124,6 +122,8 @@ def parameters_off(comparison: Comparison, rounds: Sequence[Round]) -> dict[str,
     if not rounds or comparison.missing:
         return comparison.off.parameters
     case, tested, last = comparison.case, comparison.tested, rounds[-1].start
+    if case.rates_only:
+        return spreads_off(case, tested, last.model)
     off = off_beside(case, tested, last, last.base).parameters
     refits = [d.refit for d in last.prediction.draws if d.refit is not None]
     as_read = [off_beside(case, tested, last, refit).parameters for refit in refits[-1:]] if off else []
@@ -156,9 +156,9 @@ def off_beside(case: Case, tested: SensorModel, last: Hypothesis, unit: BaseFit)
     return off_nominal(case, reduce(SensorModel.with_effect, patterns, tested), unit)
 
 
-def may_be_chance(comparison: Comparison, found: Sequence[tuple[Fit, Round]]) -> bool:
+def may_be_chance(comparison: Comparison, kept_fits: Sequence[tuple[Fit, Round]]) -> bool:
     """Whether nothing was found, and the alarm was a weak one."""
-    return not found and comparison.smallest_p > comparison.null.settings.judging.chance_p
+    return not kept_fits and comparison.smallest_p > comparison.null.settings.judging.chance_p
 
 
 def second_left_out(case: Case) -> bool:
@@ -166,17 +166,15 @@ def second_left_out(case: Case) -> bool:
     return SECOND in case.budget.left_out
 
 
-def up_to_named(case: Case, null: Null, values: Floats, rounds: Sequence[Round]) -> list[Round]:
+def up_to_named(comparison: Comparison, rounds: Sequence[Round]) -> list[Round]:
     """The rounds up to the one whose effects are named.
 
     That is the last of those that explain all or nearly all and take most of the earlier remainder: a round that takes
     less stands for details of the earlier law.  Otherwise it is the one with most names that are shown to be right,
     and fewest others.  If there is none either, the rounds end at the smallest held-out gap: an empirical patch has to
     be of use in recordings that took no part.
-
-    Args:
-        values: (S,) measured statistics.
     """
+    case, null, values = comparison.case, comparison.null, comparison.values
     *before, last = rounds
     ends = [(r, explanation_of(null, values, rounds[: n + 1])) for n, r in enumerate(rounds) if n > 0]
     explaining = [r for r, made in ends if made.degree in NEARLY]
@@ -194,19 +192,20 @@ def up_to_named(case: Case, null: Null, values: Floats, rounds: Sequence[Round])
     return list(rounds) if end is last else [*before, replace(end, fits=())]
 
 
-def with_given_parameters(problem: Problem, tested: SensorModel, rounds: Sequence[Round]) -> list[Round]:
+def with_given_parameters(comparison: Comparison, rounds: Sequence[Round]) -> list[Round]:
     """The rounds with the tested model's nominal parameters in the last unit, where these explain the data as well.
 
     The fitted ones stay where they take more than half of the nominal ones' remainder.  An effect whose law differs in
     details moves the statistics by which a parameter is known.
-
-    Args:
-        problem: the problem of the null model.
-        tested: the model under test.
     """
     *before, end = rounds
+    problem, tested = comparison.problem, comparison.tested
     null, values, last = problem.null, problem.values, end.start
-    if last.effects <= {e.name for e in tested.effects} or explanation_of(null, values, rounds).degree not in NEARLY:
+    if (
+        comparison.missing
+        or last.effects <= {e.name for e in tested.effects}
+        or explanation_of(null, values, rounds).degree not in NEARLY
+    ):
         return list(rounds)
     off = off_beside(problem.case, tested, last, last.base)
     count = problem.settings.twins.in_the_end
@@ -222,22 +221,22 @@ def with_given_parameters(problem: Problem, tested: SensorModel, rounds: Sequenc
 
 
 def named(
-    comparison: Comparison, found: Sequence[tuple[Fit, Round]], explained: Explanation
+    comparison: Comparison, kept_fits: Sequence[tuple[Fit, Round]], explained: Explanation
 ) -> tuple[NamedEffect, ...]:
     """Effects that the refit found missing, if names are right, and those of the search that have a margin."""
     place, time = where(comparison.case), when(comparison.case)
-    by_search = tuple(named_by_search(comparison, f, r, place, time) for f, r in found if f.name in explained.names)
+    by_search = tuple(named_by_search(comparison, f, r, place, time) for f, r in kept_fits if f.name in explained.names)
     if explained.degree != UNKNOWN:
         return (*(named_by_refit(m) for m in comparison.missing), *by_search)
     return by_search
 
 
-def described(comparison: Comparison, found: Sequence[tuple[Fit, Round]], explained: Explanation) -> dict[str, Any]:
+def described(comparison: Comparison, kept_fits: Sequence[tuple[Fit, Round]], explained: Explanation) -> dict[str, Any]:
     """The structure of an unknown discrepancy, the nearest candidate and its faults, and the search left out."""
     case = comparison.case
     about = structure(case, comparison.null, comparison.residuals)
-    about["best_candidate"] = found[0][0].name if found else None
-    if found:
+    about["best_candidate"] = kept_fits[0][0].name if kept_fits else None
+    if kept_fits:
         about["not_named"] = explained.fault(case.settings.concluding)
     if second_left_out(case):
         about |= {"not_looked_for": SECOND, "effort": enough_effort(case)}
@@ -246,13 +245,12 @@ def described(comparison: Comparison, found: Sequence[tuple[Fit, Round]], explai
 
 def enough_effort(case: Case) -> int:
     """Budget with which another effect would have been searched for, in tens."""
-    another = case.settings.searching.campaigns_per_effect
-    return 10 * math.ceil((case.budget.simulated / len(case.conditions) + another + 1) / 10)
+    return 10 * math.ceil((case.budget.simulated / len(case.conditions) + CAMPAIGNS_PER_EFFECT + 1) / 10)
 
 
-def tied(found: Sequence[tuple[Fit, Round]]) -> dict[str, Any]:
+def tied(kept_fits: Sequence[tuple[Fit, Round]]) -> dict[str, Any]:
     """The candidates of the first tie, and the experiment that separates them."""
-    members = next([f.name, *r.rivals] for f, r in found if r.rivals)
+    members = next([f.name, *r.rivals] for f, r in kept_fits if r.rivals)
     return {"members": members, "experiment": candidate(members[0]).experiment}
 
 

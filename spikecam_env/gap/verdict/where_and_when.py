@@ -37,6 +37,8 @@ FIELDS_PER_SIDE = 3
 
 def where(case: Case) -> str:
     """Rows and columns of the fields that stand out; empty where none does, or most do."""
+    if case.rates_only:
+        return ""
     irregular = np.zeros(case.base.gain.size)
     off = np.zeros(case.base.gain.size)
     for c, o in zip(case.conditions, case.observations, strict=True):
@@ -107,6 +109,8 @@ def rows_and_columns(field: int, shape: tuple[int, int]) -> str:
 
 def when(case: Case) -> str:
     """The half of steady recordings in which a discrepancy acts; empty where always."""
+    if case.rates_only:
+        return ""
     votes = []
     irregular = np.zeros(2)
     for c, o in zip(case.conditions, case.observations, strict=True):

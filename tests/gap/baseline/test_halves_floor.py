@@ -14,7 +14,7 @@ from spikecam_env.gap.compare.prediction import values_of
 from spikecam_env.gap.result import Gap
 from spikecam_env.gap.twins.simulate import expose
 from spikecam_env.gap.unit.conversion import unit_from_refit
-from spikecam_env.gap.verdict.gap import usable_floor
+from spikecam_env.gap.verdict.comparison import usable_floor
 from spikecam_env.streams import unpack_frames
 
 

@@ -9,7 +9,7 @@ import pytest
 from small import SHAPE, effect, recorded, unit
 
 from spikecam_env.gap import Dark, Flat
-from spikecam_env.gap.baseline.missing_from_refit import missing_effects
+from spikecam_env.gap.baseline.missing_from_refit import LEAST_SPREAD, missing_effects
 from spikecam_env.gap.observe.conditions import planned_conditions
 from spikecam_env.gap.observe.observation import observe
 from spikecam_env.gap.twins.case import case_of
@@ -129,5 +129,5 @@ def test_noise_that_twins_without_it_seem_to_have_is_not_missing(quanta):
     seen_by = [observe(expose(camera, law, c, SHAPE, 1, take), SHAPE, film=False) for take, c in enumerate(shown)]
     case = case_of(SHAPE, shown, seen_by, 1)
     print(f"s^2 of the refit {case.base.white:.3g}, of the camera {1 / quanta:.3g}")
-    assert case.base.white > case.settings.baseline.least_spread**2
+    assert case.base.white > LEAST_SPREAD**2
     assert [m.effect.name for m in missing_effects(case, IDEAL, NAMES)] == ([] if np.isinf(quanta) else ["shot_noise"])

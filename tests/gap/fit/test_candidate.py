@@ -12,8 +12,7 @@ from spikecam_env.gap.candidates.table import testable as split_testable
 from spikecam_env.gap.compare.step import scale_of
 from spikecam_env.gap.fit.candidate import fit
 from spikecam_env.gap.fit.predict import predict_by_twins
-from spikecam_env.gap.fit.problem import standing_on
-from spikecam_env.gap.fit.recordings import recordings_affected
+from spikecam_env.gap.fit.problem import recordings_affected, standing_on
 from spikecam_env.gap.unit.refit import constrained_refit
 from spikecam_env.sensor import CATALOGUE
 

@@ -33,11 +33,6 @@ def test_a_phase_s_interval_goes_through_the_end_of_its_period():
     assert interval_of(*PHASE, 0.02, 0.4) == (0.0, 1.0)
 
 
-def test_what_is_fitted_by_steps_has_as_much_on_both_sides():
-    assert interval_of("vignetting", "centre_x", 0.4, 0.1, by_steps=True) == pytest.approx((0.2355, 0.5645))
-    assert interval_of("vignetting", "centre_x", 0.4, 0.5, by_steps=True) == (0.0, 1.0)
-
-
 @pytest.mark.parametrize("sd", [0.0, math.nan, math.inf])
 def test_without_an_error_there_is_no_interval(sd: float):
     assert interval_of(*TAU, 6.0, sd) is None

@@ -67,7 +67,7 @@ def campaign(seed: int, limit: float, true: float = TRUE["fraction"]) -> ByLaw:
     draws = tuple(Draw(n, v, None) for n, v in enumerate(values))
     null = Null(keys, values.mean(axis=0), np.ones(COUNT), np.full(COUNT, 1e-9), TWINS, TWINS - 1, draws=draws)
     measured = law(with_effect(MODEL, NAME, TRUE | {"fraction": true})) + rng.standard_normal(COUNT)
-    case = SimpleNamespace(jobs=1, base=unit(), conditions=(), budget=Budget(limit))
+    case = SimpleNamespace(jobs=1, base=unit(), conditions=(), rates_only=False, budget=Budget(limit))
     return ByLaw(case, MODEL, null, measured, measured)
 
 

@@ -3,8 +3,7 @@
 import pytest
 from small import effect, null, problem_of, recorded
 
-from spikecam_env.gap.fit.candidate import fit
-from spikecam_env.gap.fit.shapes import with_fitted_shapes
+from spikecam_env.gap.fit.candidate import fit, with_fitted_shapes
 
 
 @pytest.mark.parametrize("start", [0.4, 2.5])

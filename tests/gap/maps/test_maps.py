@@ -90,6 +90,24 @@ def test_shading_is_named_in_maps_of_a_thousand_pixels(tmp_path: Path) -> None:
     assert found.effects[0].parameters["falloff"].value == pytest.approx(0.3, abs=0.08)
 
 
+def test_the_centre_of_shading_is_found_where_the_lens_is_off_the_middle(tmp_path: Path) -> None:
+    folder = campaign_of(tmp_path / "maps", effect("vignetting", falloff=0.4, centre_x=0.65, centre_y=0.3))
+    found = diagnose(folder, "scsim", candidates=("vignetting",), progress=False)
+    values = {name: p.value for name, p in found.effects[0].parameters.items()}
+    print(values)
+    assert (values["centre_x"], values["centre_y"]) == pytest.approx((0.65, 0.3), abs=0.05)
+
+
+def test_two_dozen_dead_pixels_of_eight_thousand_are_named(tmp_path: Path) -> None:
+    """Thirty times the default, from which a search starts."""
+    folder = campaign_of(tmp_path / "maps", effect("dead_pixels", fraction=0.003))
+    found = diagnose(folder, "scsim", candidates=("dead_pixels", "hot_pixels"), progress=False)
+    print(found.sentence)
+    assert found.verdict == "named" and [e.name for e in found.effects] == ["dead_pixels"]
+    low, high = found.effects[0].parameters["fraction"].interval
+    assert low < 0.003 < high
+
+
 def test_rates_of_unknown_light_alone_say_nothing(tmp_path: Path) -> None:
     folder = campaign_of(tmp_path / "maps")
     about = json.loads((folder / "campaign.json").read_text())

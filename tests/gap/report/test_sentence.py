@@ -9,8 +9,7 @@ import made_up
 import pytest
 
 from spikecam_env.gap.report.sentence import gap_line, heading, sentence
-from spikecam_env.gap.result import Diagnosis, Gap
-from spikecam_env.gap.verdict.notes import Note
+from spikecam_env.gap.result import Diagnosis, Gap, Note
 
 
 def sentence_of(d: Diagnosis) -> str:

@@ -9,8 +9,9 @@ from spikecam_env.gap.baseline.null_model import model_null
 from spikecam_env.gap.compare.prediction import values_of
 from spikecam_env.gap.fit.problem import Problem
 from spikecam_env.gap.screen.templates import shipped_templates
-from spikecam_env.gap.search.cancelling_pair import PAIR, fit_pair
 from spikecam_env.gap.search.forward import forward_selection
+from spikecam_env.gap.search.joint_start import CANCELLING as PAIR
+from spikecam_env.gap.search.joint_start import fit_cancelling_pair
 from spikecam_env.sensor import Effect
 
 TAU_US = 2.0
@@ -30,15 +31,15 @@ def problem() -> Problem:
 
 
 def test_one_twin_of_both_says_how_strong_they_are(problem):
-    found = fit_pair(problem, PAIR)
+    found = fit_cancelling_pair(problem, PAIR)
     assert found is not None and {e.name for e in found.model.effects} >= set(PAIR)
     there = {e.name: e.parameters() for e in found.model.effects}
     before = problem.misfit()
     print(f"{there['dead_time']}, {found.parameters}: misfit {before:.0f}, {found.misfit:.0f}")
     assert there["dead_time"]["tau_us"] == pytest.approx(TAU_US, rel=0.05)
-    assert found.parameters["beta"] == pytest.approx(-TAU_US / 25.0, rel=0.05)
+    assert there["photo_response_nonlinearity"]["beta"] == pytest.approx(-TAU_US / 25.0, rel=0.05)
     assert found.misfit < before - 100
-    assert fit_pair(problem, PAIR[:1]) is None
+    assert fit_cancelling_pair(problem, PAIR[:1]) is None
 
 
 @pytest.mark.slow

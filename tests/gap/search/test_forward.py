@@ -10,8 +10,7 @@ from spikecam_env.gap.compare.distance import residual_and_misfit
 from spikecam_env.gap.compare.prediction import Null, Prediction
 from spikecam_env.gap.fit.hypothesis import Fit, Hypothesis
 from spikecam_env.gap.fit.problem import Problem
-from spikecam_env.gap.search.choice import chosen_of
-from spikecam_env.gap.search.rivals import is_rival, lead
+from spikecam_env.gap.search.choice import chosen_of, is_rival, lead
 from spikecam_env.gap.settings import Deviance
 
 DEVIANCE = Deviance()

@@ -6,7 +6,7 @@ import numpy as np
 from small import TWINS, made_up_null
 
 from spikecam_env.gap.compare.prediction import Null, Prediction
-from spikecam_env.gap.search.rivals import is_rival, lead
+from spikecam_env.gap.search.choice import is_rival, lead
 from spikecam_env.gap.settings import Deviance
 
 TIE = Deviance().tie

@@ -12,13 +12,10 @@ from spikecam_env.cli.diagnose import Diagnose
 from spikecam_env.gap.baseline.off_nominal import OffNominal
 from spikecam_env.gap.compare.prediction import Prediction, values_of
 from spikecam_env.gap.report.sentence import sentence, unfinished
-from spikecam_env.gap.search.forward import SECOND
-from spikecam_env.gap.settings import DiagnosisSettings
+from spikecam_env.gap.search.forward import CAMPAIGNS_PER_EFFECT, SECOND
 from spikecam_env.gap.twins.budget import CAMPAIGNS, Budget
 from spikecam_env.gap.verdict.comparison import Comparison
 from spikecam_env.gap.verdict.verdict import conclude
-
-PER_EFFECT = DiagnosisSettings().searching.campaigns_per_effect
 
 
 def test_a_skipped_step_is_noted_once():
@@ -57,10 +54,10 @@ def test_nothing_is_named_where_a_second_effect_was_not_looked_for(left_out: lis
     if verdict == "unknown":
         asked = said.unknown["effort"]
         assert said.unknown["not_looked_for"] == SECOND and said.unknown["best_candidate"] == "dead_time"
-        assert len(case.conditions) * asked > 300 + PER_EFFECT * len(case.conditions) and asked % 10 == 0
+        assert len(case.conditions) * asked > 300 + CAMPAIGNS_PER_EFFECT * len(case.conditions) and asked % 10 == 0
         assert f"--effort {asked}" in sentence(said, "scsim") and "dead time comes nearest" in sentence(said, "scsim")
 
 
 def test_the_most_by_default_is_enough_to_look_for_a_second_effect():
     """Of thirteen recordings: after the twins of the noise, a first effect and all its shapes."""
-    assert Budget(CAMPAIGNS * 13, [100 * 13]).allows(SECOND, PER_EFFECT * 13, needed=True)
+    assert Budget(CAMPAIGNS * 13, [100 * 13]).allows(SECOND, CAMPAIGNS_PER_EFFECT * 13, needed=True)

@@ -8,9 +8,8 @@ import numpy as np
 import pytest
 
 from spikecam_env.gap.fit.hypothesis import Fit, Hypothesis
-from spikecam_env.gap.result import why_rejected
 from spikecam_env.gap.search.round import Round
-from spikecam_env.gap.verdict.ranking import ranking
+from spikecam_env.gap.verdict.ranking import ranking, why_rejected
 from spikecam_env.sensor import SensorModel
 
 MODEL = SensorModel.preset("scsim")

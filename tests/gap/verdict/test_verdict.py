@@ -10,10 +10,18 @@ import pytest
 
 from spikecam_env.gap.baseline.off_nominal import OffNominal
 from spikecam_env.gap.compare.prediction import Null
-from spikecam_env.gap.result import EXPLAINS_ALL, EXPLAINS_NEARLY_ALL, LARGEST, UNKNOWN, Gap
+from spikecam_env.gap.result import (
+    EXPLAINS_ALL,
+    EXPLAINS_NEARLY_ALL,
+    LARGEST,
+    UNKNOWN,
+    Gap,
+    Note,
+    gap_is_fitted,
+    notes_of,
+)
 from spikecam_env.gap.statistics import StatisticKey
 from spikecam_env.gap.verdict.comparison import Comparison, aligned_mean
-from spikecam_env.gap.verdict.notes import Note, gap_is_fitted, notes_of
 from spikecam_env.gap.verdict.verdict import may_be_chance, verdict_of
 
 COUNT = 100

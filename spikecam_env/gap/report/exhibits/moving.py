@@ -44,13 +44,13 @@ def light_features(light: Array, shape: tuple[int, int]) -> dict[str, Array]:
     padded = np.pad(film, ((0, 0), (1, 1), (1, 1)), mode="edge")
     around_it = (padded[:, 2:, 1:-1] + padded[:, :-2, 1:-1] + padded[:, 1:-1, 2:] + padded[:, 1:-1, :-2]) / 4
     row = (np.arange(shape[0]) / max(shape[0] - 1, 1) - 0.5)[None, :, None]
-    found = {
+    per_pixel = {
         "Where it brightens": change,
         "Where it was brighter just before": past - film,
         "Where neighbours are brighter": around_it - film,
         "Where it brightens in low rows": row * change,
     }
-    return {name: f.reshape(bins, -1) for name, f in found.items()}
+    return {name: f.reshape(bins, -1) for name, f in per_pixel.items()}
 
 
 def _over_feature(title: str, feature: Array, films: Sequence[NDArray[np.uint8] | None]) -> PlotPanel | None:
