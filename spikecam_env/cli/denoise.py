@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any, ClassVar, Literal
 
 import tyro
 
 from spikecam_env.cli.mode_weights import Brightness, Mode, brightness_for
 from spikecam_env.cli.reading import ReadingOptions
+from spikecam_env.cli.without_effect import WithoutEffect
 from spikecam_env.numbers import Count, Whole
 
 if TYPE_CHECKING:
@@ -57,6 +58,10 @@ class Denoise:
     film: bool = True
     """Also write film.mp4, noisy beside denoised: at most 240 pictures, evenly over the recording."""
     reading: ReadingOptions = field(default_factory=ReadingOptions)
+
+    without_effect: ClassVar = (
+        WithoutEffect(("mode",), lambda c: c.weights is not None, "--weights says which network"),
+    )
 
     def run(self) -> None:
         from spikecam_env.cli.files import out_folder, write_json
@@ -126,7 +131,7 @@ class Denoise:
 
     def _write_stream(self, folder: Path, recording: Recording, found: DenoisedRecording) -> None:
         from spikecam_env.streams import SpikeWriter
-        from spikecam_env.streams.recording import BRIGHTNESS
+        from spikecam_env.streams.hdf5 import BRIGHTNESS
 
         attributes = {k: v for k, v in recording.attributes.items() if k in ("model", "seed", "scene")}
         attributes |= {"denoiser": self._name, "source": self.file.name, "first": self.first}

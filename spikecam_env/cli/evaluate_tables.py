@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 
 import tyro
 
 from spikecam_env.cli.options import Size
+from spikecam_env.cli.without_effect import WithoutEffect
 from spikecam_env.errors import InputError
 from spikecam_env.numbers import Count, Range, WholeRange, Workers
 
@@ -20,6 +22,20 @@ SHORTEST, LONGEST = 1.0, 1e4
 """Mean intervals [frames]; the longest is a spike in a quarter of a second at 40 kHz."""
 FASTEST = 100.0
 """Pixels a frame; a picture of 400 is crossed in 4 frames."""
+
+
+OWN_WEIGHTS = {"paper": "paper", "no_refine": "paper-no-refine", "best": "best"}
+"""Name of the weights that an option gives."""
+
+
+def _has_no_row_of(weights: str, options: TableOptions) -> bool:
+    """Whether no row of a table is made with these weights."""
+    from denoiser.evaluate.flow import FLOW_TABLE
+    from denoiser.evaluate.rows import ROWS, weights_of
+    from denoiser.evaluate.tables import TABLES
+
+    rows = options.rows or {**TABLES, "flow": FLOW_TABLE}[options.table].rows
+    return all(weights_of(ROWS[row].source) != weights for row in rows if row in ROWS)
 
 
 @dataclass
@@ -44,6 +60,11 @@ class TableOptions:
     jobs: Workers = 1
     """Worker processes, one thread each; 1 works in this one, with all threads."""
 
+    without_effect: ClassVar = tuple(
+        WithoutEffect((option,), partial(_has_no_row_of, name), f"no row is made with weights of {name}")
+        for option, name in OWN_WEIGHTS.items()
+    )
+
     @property
     def table(self) -> str:
         """Its name: `table1`, ..., `still`."""
@@ -53,7 +74,7 @@ class TableOptions:
         """The files that were given."""
         from denoiser.evaluate.rows import Weights
 
-        given = {"paper": self.paper, "paper-no-refine": self.no_refine, "best": self.best}
+        given = {name: getattr(self, option) for option, name in OWN_WEIGHTS.items()}
         if self.weights is not None and not self.weights.is_dir():
             raise InputError(f"--weights {self.weights}: there is no such folder")
         return Weights.found(self.weights, {name: path for name, path in given.items() if path is not None})
@@ -90,9 +111,21 @@ class OnScenes(TableOptions):
     data: Path | None = None
     """Dataset of `spikecam dataset phm-n` to take streams from, instead of simulating them."""
 
+    without_effect: ClassVar = (
+        *TableOptions.without_effect,
+        WithoutEffect(
+            ("size", "seeds", "intervals", "speeds", "frames", "pan"),
+            lambda c: c.data is not None,
+            "--data has streams of its own",
+        ),
+    )
+
     def run(self) -> None:
         from denoiser.evaluate.phm import SCENES
 
+        if self.data is not None:
+            self.show(scenes=self.scenes or SCENES, data=self.data)
+            return
         self.show(
             scenes=self.scenes or SCENES,
             shape=self.size,
@@ -101,7 +134,6 @@ class OnScenes(TableOptions):
             speeds=self.speeds,
             pan=self.pan,
             frames=self.frames,
-            data=self.data,
         )
 
 

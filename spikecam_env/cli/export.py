@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
 
 import tyro
 
 from spikecam_env.cli.mode_weights import Brightness, Mode, brightness_for
-from spikecam_env.errors import InputError
+from spikecam_env.cli.without_effect import WithoutEffect
 from spikecam_env.numbers import Count, Positive, Whole
 
 if TYPE_CHECKING:
@@ -61,11 +61,18 @@ class Export:
     """With --denoise: spikes are made of rates times this, as of `spikecam denoise`; auto: a factor for each
     recording."""
 
+    without_effect: ClassVar = (
+        WithoutEffect(("overlap", "brightness"), lambda c: c.denoise is None, "nothing is denoised without --denoise"),
+        WithoutEffect(
+            ("frames", "clips", "first", "count", "rate", "bits"),
+            lambda c: c.layout == "scflow",
+            "SCFlow's layout has no such choice",
+        ),
+    )
+
     def run(self) -> None:
         from spikecam_env.cli.table import table
 
-        if self.denoise is None and (self.overlap or self.brightness != 1.0):
-            raise InputError("--overlap and --brightness are of a denoiser; add --denoise best, or leave them out")
         print(table(self._spikezoo() if self.layout == "spikezoo" else self._scflow()))
         print(f"wrote {self.out}" + (f"; white is {self.rate:g} spikes/frame" if self.layout == "spikezoo" else ""))
 
@@ -98,10 +105,6 @@ class Export:
     def _scflow(self) -> list[dict[str, Any]]:
         from spikecam_env.datasets.export import export_scflow
 
-        for name in ("frames", "clips", "first", "count", "rate", "bits"):
-            default = next(field.default for field in fields(self) if field.name == name)
-            if getattr(self, name) != default:
-                raise InputError(f"--{name} {getattr(self, name)}: SCFlow's layout has no such choice; leave it out")
         done = export_scflow(self.sources, self.out, stream=self.stream, restore=self._restore, progress=True)
         return [
             {
