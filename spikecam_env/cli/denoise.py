@@ -46,6 +46,8 @@ class Denoise:
     Pictures of the rate are of one frame."""
     overlap: bool = False
     """Not for `paper`: passes that overlap by half: less error, no seams, twice the time."""
+    ease: bool = False
+    """Not for `paper`: ease each pass into the next: half the flicker at their seams, in the same time."""
     calibration: Path | None = None
     """Not for `paper`: maps.h5 of `spikecam calibrate`, or its folder: the camera's fixed pattern is then taken out."""
     first: Whole = 0
@@ -61,6 +63,7 @@ class Denoise:
 
     without_effect: ClassVar = (
         WithoutEffect(("mode",), lambda c: c.weights is not None, "--weights says which network"),
+        WithoutEffect(("ease",), lambda c: c.overlap, "passes that overlap have no seams"),
     )
 
     def run(self) -> None:
@@ -107,7 +110,8 @@ class Denoise:
         noisy = recording.spikes
         window = checked_window(self.window, len(noisy))
         light = light_at(self.file, whole_windows(len(noisy), window), noisy.shape[1:], self.first)
-        options: dict[str, Any] = {"overlap": self.overlap, "unit": self.calibration, "engine": self.engine}
+        options: dict[str, Any] = {"overlap": self.overlap, "ease": self.ease}
+        options |= {"unit": self.calibration, "engine": self.engine}
         options["brightness"] = brightness_for(self.brightness, noisy)
         if self.weights is None:
             online = OnlineDnSS.pretrained(self.mode, output="both", **options)

@@ -46,8 +46,8 @@ class TableOptions:
     """Folder for the table as text, JSON and a page of pictures; a run that was stopped goes on in it."""
     rows: Annotated[tuple[str, ...], tyro.conf.arg(metavar="ROW...", help_behavior_hint="(default: the table's)")] = ()
     """Rows to show, of noisy, tfp, ssml, spk2img-clean, spk2img-noisy, baseline-held, baseline-mus, baseline,
-    paper-held, paper-mus, paper, fast, best, best-overlap, best-map, best-bright, fast-bright, clean, light-held,
-    light-mus, light; noisy is always there."""
+    paper-held, paper-mus, paper, fast, best, best-overlap, best-eased, best-map, best-bright, fast-bright, clean,
+    light-held, light-mus, light; noisy is always there."""
     weights: Path | None = None
     """Folder whose paper.pt, paper-no-refine.pt, fast.pt, best.pt, spk2img-clean.pt, spk2img-noisy.pt and ssml.pt count
     before the shipped ones."""

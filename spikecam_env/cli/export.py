@@ -57,12 +57,17 @@ class Export:
     """The stream goes through this denoiser first."""
     overlap: bool = False
     """With --denoise, but `paper`: passes that overlap by half: less error, twice the time."""
+    ease: bool = False
+    """With --denoise, but `paper`: passes eased into one another: half the flicker at their seams, in the same time."""
     brightness: Brightness = 1.0
     """With --denoise: spikes are made of rates times this, as of `spikecam denoise`; auto: a factor for each
     recording."""
 
     without_effect: ClassVar = (
-        WithoutEffect(("overlap", "brightness"), lambda c: c.denoise is None, "nothing is denoised without --denoise"),
+        WithoutEffect(
+            ("overlap", "ease", "brightness"), lambda c: c.denoise is None, "nothing is denoised without --denoise"
+        ),
+        WithoutEffect(("ease",), lambda c: c.overlap, "passes that overlap have no seams"),
         WithoutEffect(
             ("frames", "clips", "first", "count", "rate", "bits"),
             lambda c: c.layout == "scflow",
@@ -128,7 +133,8 @@ class Export:
 
         assert self.denoise is not None
         brightness = brightness_for(self.brightness, spikes)
-        online = OnlineDnSS.pretrained(self.denoise, output="both", overlap=self.overlap, brightness=brightness)
+        joined = {"overlap": self.overlap, "ease": self.ease}
+        online = OnlineDnSS.pretrained(self.denoise, output="both", brightness=brightness, **joined)
         found, _, _ = restore(spikes, online, ())
-        how = {"mode": self.denoise, "overlap": self.overlap, "brightness": brightness, "saturated": online.saturated}
+        how = {"mode": self.denoise, **joined, "brightness": brightness, "saturated": online.saturated}
         return found, how

@@ -1,4 +1,4 @@
-"""Options that change nothing beside others are refused; runs that leave an option unread show where a rule is missing."""
+"""Options that change nothing beside others are refused; an option that a run leaves unread shows a missing rule."""
 
 from __future__ import annotations
 
@@ -30,9 +30,11 @@ REFUSED = {
     "view Fan-v0": "--split test",
     "dataset phm-n --out a --ray auto": "--jobs 2",
     "dataset films a --out a --ray ray-head:6379": "--jobs 2",
-    "export a --out b": "--overlap; --brightness 4",
+    "export a --out b": "--overlap; --ease; --brightness 4",
+    "export a --out b --denoise best --overlap": "--ease",
     "export a --out b --layout scflow": "--frames 301; --clips 1; --first 0; --count 9; --rate 1; --bits 8",
     "denoise a.h5 --weights a.pt": "--mode best",
+    "denoise a.h5 --overlap": "--ease",
     "live disk": "--loop; --flip; --bit_order big",
     "live ball": "--rpm 3",
     "live a.dat": "--size 8 8; --rpm 3; --seed 1; --effect dead_time; --frame-rate 3",
