@@ -19,7 +19,7 @@ import numpy as np
 from denoiser.passes.window import check_like
 from spikecam_env.types import Pictures
 
-EASE = (0.7, 0.39, 0.23, 0.16, 0.11, 0.07, 0.04)
+EASE = (0.67, 0.38, 0.23, 0.16, 0.12, 0.1, 0.06)
 """Share of the jump that is taken out of each of the first planes of a pass; `python -m tools.fit_ease` prints them,
 by least squares on training streams of `best`."""
 STILL = 1e-3

@@ -87,7 +87,7 @@ class TrainConfig:
     teacher: Annotated[str | None, _weights] = None
     """Of `best` and `fast`: weights whose rates the network is to learn instead of the light, a file or "best"."""
     layers: Annotated[str, _layers] = OF_MODE
-    """Of `best` and `fast`: those that learn, "all" or "last" (`stream_network.LAST`), for a third of the work."""
+    """Of `best` and `fast`: those that learn, "all" or "last" (`stream_network.LAST`)."""
     seams: Annotated[float, Range(0, 1000).check] = OF_MODE
     """Of `best` and `fast`: weight of steps from pass to pass in the loss (`rollout`), 0 without the option."""
     panned: Annotated[float, Range(0, 1).check] = OF_MODE

@@ -57,7 +57,7 @@ class Train:
     """Weights whose rates `best` or `fast` learns instead of the true light, as a small network does better: a file, or
     `best`."""
     layers: Literal["all", "last"] | None = None
-    """Layers of `best` or `fast` that learn: all, or, of weights to begin from, the last, for a third of the work."""
+    """Layers of `best` or `fast` that learn: all, or, of weights to begin from, the last."""
     seams: Annotated[float, Range(0.0, 1000.0)] | None = None
     """Weight of the steps from pass to pass in the loss of `best` or `fast`.  Default: 0."""
     panned: Annotated[float, Range(0.0, 1.0)] | None = None
