@@ -83,6 +83,17 @@ READ = {
     "evaluate table1 --scenes disk --rows noisy --size 16 24 --frames 220": ("best", "paper", "no_refine"),
     "play Catch-v1 --film a.mp4 --size 16 24": (),
     "bench online": (),
+    "demo --quick --size 48 80 --no-open": (),
+    "demo --size 48 80 --frames 500 --no-open": (),
+    "campaign simulate camera --shape 16 16 --frames 400 --recording flat:radiance=0.3": (),
+    "campaign import . camera --label a.h5=unknown --outside": (),
+    "effects": ("effect_file",),  # by `effects_of`, before the run
+    "effects show dead_time": ("effect_file",),
+    "effects new sag": (),
+    "dataset verify data": (),
+    "evaluate tasks --tasks Catch-v1 --episodes 1": (),
+    "evaluate agents --out study --tasks Catch-v1 --observations oracle --episodes 1 --size 16 16": (),
+    "train-agent Catch-v1 --out agent --steps 2 --environments 2": (),
 }
 """Lines that run in a second, and options that are read in them by another way than by their name."""
 
