@@ -31,12 +31,13 @@ class ManyDnSS:
         shape: (rows, columns).
 
     Raises:
-        InputError: the denoiser has `overlap`, or spikes of another size are pushed.
+        InputError: the denoiser has `overlap` or `ease`, or spikes of another size are pushed.
     """
 
     def __init__(self, like: OnlineDnSS, streams: int, shape: tuple[int, int]) -> None:
-        if like.overlap:
-            raise InputError("overlap is True; many streams are denoised by one chain of passes each, leave it False")
+        for name in ("overlap", "ease"):
+            if getattr(like, name):
+                raise InputError(f"{name} is True; passes of many streams are given as they are, leave it False")
         self._like, self.shape = like, checked_shape(shape)
         self._passes = passes_of(like.engine, self.shape, checked_count(streams, "streams"))
         self.finished = np.zeros(len(self), np.int64)

@@ -24,6 +24,7 @@ from tqdm import tqdm
 from denoiser.decoders import accumulate, mus
 from denoiser.decoders.brightness import brightened, checked_brightness, saturating
 from denoiser.passes.crossfade import Crossfade
+from denoiser.passes.eased import LEAST_PLANES, Eased
 from denoiser.passes.engine import Engine
 from denoiser.passes.infer import on_host
 from denoiser.passes.on_device import spikes_on, unpacked_on
@@ -68,9 +69,11 @@ class OnlineDnSS:
             path of its maps.h5, or a `PixelMap`.
         overlap: `best` mode only: two chains of passes, half a pass apart, and their mean (`crossfade.py`): less
             error, no seams, twice the work.
+        ease: `best` mode only: the first planes of a pass lean on the last ones of the pass before (`eased.py`): half
+            the flicker of the seams, for no more work.
         device: `best` mode only: windows, planes and network as tensors there, "cuda", "cuda:1" or "cpu"
-            (`on_device.py`).  In float32 rates differ by less than 1e-5 from those without.  Spikes, and the mean
-            of `overlap`, are made of them on the host.  Default: windows on the processor, in compiled code.
+            (`on_device.py`).  In float32 rates differ by less than 1e-5 from those without.  Spikes, and rates with
+            `overlap` or `ease`, are made of them on the host.  Default: windows on the processor, in compiled code.
         step: `picture` mode only: frames from a picture to the next, 8 to 4000; default 40.
         look: `picture` mode only: age of a picture, 4 to 24 frames; default 12.
         brightness: spikes are made of rates times this, 0.01 to 100, and cut to one a frame (`saturated`); rates stay
@@ -104,6 +107,7 @@ class OnlineDnSS:
         decoder: str | None = None,
         unit: PixelMap | Calibration | tuple[ArrayLike, ArrayLike] | str | os.PathLike[str] | None = None,
         overlap: bool = False,
+        ease: bool = False,
         device: str | torch.device | None = None,
         step: int | None = None,
         look: int | None = None,
@@ -117,13 +121,18 @@ class OnlineDnSS:
         """The network, ready for passes."""
         if decoder is not None and (not isinstance(decoder, str) or decoder not in _DECODERS):
             raise unknown_name("decoder", decoder, _DECODERS)
-        if not isinstance(overlap, bool):
-            raise InputError(f"overlap is {overlap!r}; it must be True or False")
+        for name, value in (("overlap", overlap), ("ease", ease)):
+            if not isinstance(value, bool):
+                raise InputError(f"{name} is {value!r}; it must be True or False")
         if decoder is not None and recipe.decoder is None:
             raise InputError(f"decoder is {decoder!r}; a network of one picture a step has no spikes, leave it out")
         if overlap and recipe.layout.planes % 2:
             raise InputError("overlap is True; passes of this network cannot overlap by half, leave it False")
-        self._overlap = overlap
+        if ease and recipe.layout.planes < LEAST_PLANES:
+            raise InputError("ease is True; this network gives too few planes at once, leave it False")
+        if ease and overlap:
+            raise InputError("ease is True; passes that overlap have no seams, leave it False")
+        self._overlap, self._ease = overlap, ease
         self._brightness = checked_brightness(brightness)
         if self._brightness != 1.0 and recipe.decoder is None:
             raise InputError(
@@ -164,6 +173,11 @@ class OnlineDnSS:
         return self._overlap
 
     @property
+    def ease(self) -> bool:
+        """Whether passes are eased into one another."""
+        return self._ease
+
+    @property
     def brightness(self) -> float:
         """Factor between rates and the spikes that are made of them."""
         return self._brightness
@@ -188,6 +202,7 @@ class OnlineDnSS:
         self._passes: list[Passes] = []  # of the one stream; two that overlap
         self._as_tensors = False
         self._mixing: Crossfade | None = None
+        self._easing: Eased | None = None
         self._decoding: Any = None
         self._made = self._cut = 0  # pixels of the frames so far, and those that saturate
         self._ended = False
@@ -238,6 +253,7 @@ class OnlineDnSS:
             state |= {
                 "chains": [passes.state() for passes in self._passes],
                 "mixing": None if self._mixing is None else self._mixing.state(),
+                "easing": None if self._easing is None else self._easing.state(),
                 "decoding": copy.deepcopy(self._decoding),
                 "made": self._made,
                 "cut": self._cut,
@@ -271,7 +287,7 @@ class OnlineDnSS:
                 f"the state is no whole state of a denoiser ({type(error).__name__}: {error}); "
                 "give the result of `OnlineDnSS.state()`"
             ) from error
-        self._passes, self._mixing = other._passes, other._mixing
+        self._passes, self._mixing, self._easing = other._passes, other._mixing, other._easing
         self._decoding, self._ended = other._decoding, other._ended
         self._made, self._cut = other._made, other._cut
 
@@ -280,6 +296,7 @@ class OnlineDnSS:
         firsts = (0, planes // 2) if self._overlap else (0,)
         self._passes = [passes_of(self.engine, shape, first=first) for first in firsts]
         self._mixing = Crossfade(planes, shape) if self._overlap else None
+        self._easing = Eased(shape) if self._ease else None
         self._decoding = None if self._decoder is None else _DECODERS[self._decoder].start(shape)
 
     def _go_on(self, state: dict[str, Any]) -> None:
@@ -287,6 +304,8 @@ class OnlineDnSS:
             passes.restore(its)
         if self._mixing is not None:
             self._mixing.restore(state["mixing"])
+        if self._easing is not None:
+            self._easing.restore(state["easing"])
         for found, ours in zip(state["decoding"] or (), self._decoding or (), strict=True):
             check_like(found, ours, "decoding")
         self._decoding = copy.deepcopy(state["decoding"])
@@ -296,6 +315,7 @@ class OnlineDnSS:
     def _identity(self) -> dict[str, Any]:
         """The options and weights on which frames depend besides the stream."""
         own = {"recipe and weights": self._digest, "decoder": self._decoder, "overlap": self._overlap}
+        own |= {"ease": self._ease}
         return own | {"brightness": self._brightness} | self.engine.identity()
 
     def _denoise(self, done: list[list[tuple[int, Any]]]) -> Denoised:
@@ -303,7 +323,7 @@ class OnlineDnSS:
         device, shape = self.device, self._passes[0].shape
         if device is None:
             return self._decoded(done, shape)
-        if self._as_tensors and self.output == "rate" and not self._overlap:
+        if self._as_tensors and self.output == "rate" and not (self._overlap or self._ease):
             nothing = torch.empty((0, *shape), device=device)
             return torch.cat([nothing, *(rate for _, rate in done[0])])  # type: ignore[return-value]
         frames = self._decoded([[(at, on_host(rate)) for at, rate in passes] for passes in done], shape)
@@ -333,6 +353,8 @@ class OnlineDnSS:
         return np.asarray(fired)
 
     def _mixed(self, done: list[list[tuple[int, Pictures]]]) -> list[Pictures]:
+        if self._easing is not None:
+            return [self._easing.add(rate) for _, rate in done[0]]
         if self._mixing is None:
             return [rate for _, rate in done[0]]
         for start, rate in chain_of(*done):

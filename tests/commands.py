@@ -8,12 +8,22 @@ import av
 import numpy as np
 from PIL import Image
 
-from spikecam_env.cli.main import run
+from spikecam_env.cli.first_words import commands_of
+from spikecam_env.cli.main import COMMANDS, run
 
 
 def spikecam(*words: object) -> int:
     """Run a command line; returns its exit code."""
     return run([str(word) for word in words])
+
+
+def every_command() -> dict[str, type]:
+    """Classes of all commands, those of groups among them, by their words."""
+    found = {}
+    for name, options in COMMANDS.items():
+        below = commands_of(options)
+        found |= {f"{name} {word}": kind for word, kind in below.items()} or {name: options}
+    return found
 
 
 def said(error: str) -> list[str]:

@@ -86,6 +86,7 @@ ROWS: dict[str, Row] = {
     "fast-bright": Row("fast, spikes 4 times brighter", "fast", "accumulate", brightness=4.0),
     "picture": Row("picture", "picture", "accumulate", True),
     "best-overlap": Row("best, passes overlapped", "best-overlap", "accumulate", True),
+    "best-eased": Row("best, passes eased", "best-eased", "accumulate", True),
     "best-map": Row("best with calibration", "best-map", "accumulate", True),
     "picture-map": Row("picture with calibration", "picture-map", "accumulate", True),
     "clean": Row("clean twin", "clean"),
@@ -93,6 +94,8 @@ ROWS: dict[str, Row] = {
     "light-mus": Row("true light, MUS", "light", "mus"),
     "light": Row("true light, accumulated", "light", "accumulate"),
 }
+JOINED: dict[str, dict[str, Any]] = {"best-overlap": {"overlap": True}, "best-eased": {"ease": True}}
+"""Sources whose passes are joined: options of `OnlineDnSS`."""
 WeightFiles = Mapping[str, str | os.PathLike[str]]
 """Checkpoint by mode, instead of the shipped ones."""
 
@@ -217,8 +220,8 @@ def restored(online: OnlineDnSS, spikes: NDArray[np.uint8], title: str | None = 
 
 
 def denoiser(source: str, weights: Weights) -> OnlineDnSS:
-    """The denoiser of a mode, or of `best-overlap`; InputError as `OnlineDnSS`."""
-    return _online(*_version(weights.path(weights_of(source) or source)), source == "best-overlap")
+    """The denoiser of a mode, or of a source of JOINED; InputError as `OnlineDnSS`."""
+    return _online(*_version(weights.path(weights_of(source) or source)), **JOINED.get(source, {}))
 
 
 def planes_a_pass(source: str, weights: Weights) -> int:
@@ -239,8 +242,8 @@ def _count(path: Path, _: int) -> int:
 
 
 @lru_cache(maxsize=4)
-def _online(path: Path, _: int, overlap: bool = False) -> OnlineDnSS:
-    return OnlineDnSS.from_file(path, overlap=overlap)
+def _online(path: Path, _: int, **options: Any) -> OnlineDnSS:
+    return OnlineDnSS.from_file(path, **options)
 
 
 def _judged_planes(online: OnlineDnSS, exposed: ExposedStreams) -> Planes:
@@ -248,8 +251,8 @@ def _judged_planes(online: OnlineDnSS, exposed: ExposedStreams) -> Planes:
     return restored(online, exposed.noisy[: exposed.stop + online.latency]).rates[exposed.first : exposed.stop]
 
 
-def _denoised(case: StreamCase, exposed: ExposedStreams, path: Path, *, overlap: bool = False) -> Planes:
-    return _judged_planes(_online(*_version(path), overlap), exposed)
+def _denoised(case: StreamCase, exposed: ExposedStreams, path: Path, **options: Any) -> Planes:
+    return _judged_planes(_online(*_version(path), **options), exposed)
 
 
 def _calibrated(case: StreamCase, exposed: ExposedStreams, path: Path) -> Planes:
@@ -299,7 +302,7 @@ class RowSource(NamedTuple):
 
 SOURCES = {
     **{name: RowSource(_denoised, name) for name in (*MODES, "paper-no-refine")},
-    "best-overlap": RowSource(partial(_denoised, overlap=True), "best"),
+    **{name: RowSource(partial(_denoised, **options), "best") for name, options in JOINED.items()},
     "best-map": RowSource(_calibrated, "best"),
     "picture": RowSource(_pictured, "picture"),
     "picture-map": RowSource(partial(_pictured, mapped=True), "picture"),

@@ -15,7 +15,7 @@ A table that was stopped goes on where it was, in the same folder.
 from __future__ import annotations
 
 from contextlib import nullcontext
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
 from itertools import product
 from pathlib import Path
 from typing import Any
@@ -49,6 +49,8 @@ REAL_ABLATION = ABLATION[:7]
 BYTES = 12
 """A frame and pixel: noisy, clean and decoded spikes, rates and light in float32, and one byte to spare."""
 LEAST_FRAMES = 2 * phm.WARM_UP
+OF_A_DATASET = ("shape", "seeds", "intervals", "speeds", "pan", "frames")
+"""Settings of a request that a dataset has of its own."""
 
 
 @dataclass(frozen=True)
@@ -187,8 +189,9 @@ def cases_of(table: Table, request: TableRequest) -> tuple[list[StreamCase], dic
         names = held_out.still_scenes(checked_count(request.still_scenes, "scenes"))
         return [StreamCase(n, seed, shape, frames, 0.0) for n in names for seed in range(request.seeds)], {}
     if request.data is not None:
-        if tuple(request.pan) != AT_REST:
-            raise InputError(f"pan is that of the dataset {request.data}; make one with `spikecam dataset --pan`")
+        for option in fields(request):
+            if option.name in OF_A_DATASET and getattr(request, option.name) != option.default:
+                raise InputError(f"{option.name} is that of the dataset {request.data}; leave it out")
         return [case for case in phm.dataset_cases(request.data) if case.scene in request.scenes], {}
     right, down = checked_numbers(request.pan, "pan", 2, -FASTEST_PAN, FASTEST_PAN, unit="pixels/frame")
     pan = (right, down)

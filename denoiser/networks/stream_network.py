@@ -37,6 +37,9 @@ CHANNELS = (64, 128, 24)
 MOST_CHANNELS = 256
 """Of each of the three, so that a file cannot ask for more memory than there is."""
 
+LAST = ("join", "out", "head")
+"""Layers after the coarse ones, the last first to be trained further."""
+
 Carried = tuple[Tensor, Tensor] | None
 """(last, hidden), float32."""
 
@@ -85,6 +88,11 @@ class StreamDnSS(nn.Module):
         self.out = conv(fine, 4 * planes)
         self.unfold = nn.PixelShuffle(2)
         self.head = nn.Sequential(conv_relu(planes + layers + 1, head), conv(head, planes + means[1] - means[0]))
+
+    def only_last_learn(self) -> None:
+        """Freeze all layers but LAST."""
+        for name, weight in self.named_parameters():
+            weight.requires_grad_(name.partition(".")[0] in LAST)
 
     def with_channels(self, channels: tuple[int, int, int]) -> StreamDnSS:
         """An untrained network for the same windows, with other channels."""

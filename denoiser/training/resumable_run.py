@@ -27,7 +27,7 @@ class Run:
     """A run mid-way."""
 
     network: nn.Module
-    """It learns; several that learn together are one `nn.ModuleDict`."""
+    """Its weights that are not frozen learn; several that learn together are one `nn.ModuleDict`."""
     optimiser: torch.optim.Optimizer
     step: int
     seconds: float
@@ -40,7 +40,7 @@ class Run:
     @classmethod
     def begin(cls, network: nn.Module) -> Run:
         """Before the first step, on the device where the network is."""
-        weights = list(network.parameters())
+        weights = [weight for weight in network.parameters() if weight.requires_grad]
         on_gpu = weights[0].is_cuda
         rate = torch.tensor(1e-3, device=weights[0].device) if on_gpu else 1e-3  # a replayed step reads tensors alone
         return cls(network, torch.optim.Adam(weights, rate, capturable=on_gpu), 0, 0.0, [], [])
@@ -111,7 +111,7 @@ class Run:
         """InputError unless these are moments of an Adam of the same parameters and settings."""
         if not isinstance(found, dict) or found.get("settings") != self._settings():
             raise InputError(f"{where}: the optimiser has other settings or parameters")
-        weights = [p.detach().cpu() for p in self.network.parameters()]
+        weights = [p.detach().cpu() for p in self.network.parameters() if p.requires_grad]
         moments = found.get("moments")
         if not isinstance(moments, dict) or set(moments) not in (set(), set(range(len(weights)))):
             raise InputError(f"{where}: the optimiser has no moments of these parameters")

@@ -7,6 +7,7 @@ The next step that takes these streams goes on where they are.
     loss = mean (rate - light)^2 / (rate + OFFSET)            the divisor is not differentiated: no bias
          + STEADY mean (step of rate - step of light)^2 / (rate + OFFSET)
                                                               step: from frame to frame, across passes too
+         + seams mean (the step from pass to pass)^2 / (rate + OFFSET)            an option
 
 The light divides as its count noise does, so that dim scenes count.
 
@@ -101,19 +102,32 @@ class Rollouts(StreamSource):
     Args:
         recipe: of the network.
         teacher: a network of the same layout, whose rates are the target instead of the light.
+        layers: "all", or "last": gradients then stay in a pass, for the other layers are frozen.
+        seams: weight of the step from pass to pass in the loss, besides its share in STEADY.
         streams: as for `StreamSource`.
 
     Raises:
         InputError: `StreamWindows` cannot begin the layout.
     """
 
-    options = StreamSource.options | {"channels": None, "teacher": None}
+    options = StreamSource.options | {
+        "channels": None, "teacher": None, "layers": "all", "seams": 0.0, "panned": 0.0, "weak": 0.0
+    }  # fmt: skip
     pool = POOL
     twins = ("noisy",)
 
-    def __init__(self, recipe: Recipe, *, teacher: nn.Module | None = None, **streams: Any) -> None:
+    def __init__(
+        self,
+        recipe: Recipe,
+        *,
+        teacher: nn.Module | None = None,
+        layers: str = "all",
+        seams: float = 0.0,
+        **streams: Any,
+    ) -> None:
         super().__init__(recipe, **streams)
         self.layout, self.teacher = recipe.layout, teacher
+        self._through_passes, self._seams = layers == "all", seams
         count, patch, device = self.streams.count, self.streams.patch, self.streams.device
         self._windows = StreamWindows.begin(self.layout, count, (patch, patch), device)
         self._past = _Past.begin(self.layout, count, patch, device, teacher is not None)
@@ -125,7 +139,8 @@ class Rollouts(StreamSource):
             weight = valid[:, None, None, None] / (rate.detach().clamp(min=0.0) + OFFSET)
             error = rate - wanted
             steps = torch.diff(torch.cat([(before[:, :1] - before[:, 1:]), error], dim=1), dim=1)
-            total.append((weight * error.square()).mean() + STEADY * (weight * steps.square()).mean())
+            change = weight * steps.square()
+            total.append((weight * error.square()).mean() + STEADY * change.mean() + self._seams * change[:, 0].mean())
         return torch.stack(total).mean()
 
     def guesses(self, network: nn.Module, passes: int) -> Iterator[Guesses]:
@@ -165,6 +180,7 @@ class Rollouts(StreamSource):
             yield Pass(rate, wanted, before, planes, valid, windows.mapped)
             windows = learned(layout, windows, rate.detach().clamp(0.0, 1.0))
             final = torch.cat([rate[:, -1:], wanted[:, -1:]], dim=1)
+            kept = kept if self._through_passes else tuple(k.detach() for k in kept)
             past = _Past(part.light, kept[0], kept[1], final, its_kept[0], its_kept[1])
         self._windows.put(rows, windows)
         for name, value in vars(past).items():

@@ -72,6 +72,9 @@ TURNING, FASTEST_TURN = 0.4, 0.05
 STILL_BACKGROUND, STILL_SHAPE = 0.5, 0.15
 """Shares of backgrounds and of shapes that stay where they are in scenes that move."""
 
+WEAK_CONTRAST = (0.02, 0.3)
+"""Of weak texture, its brightest light over its darkest, less one: from least to greatest, even in its logarithm."""
+
 DIM, DIM_LIGHT, LIGHT = 0.3, (0.012, 0.15), (0.15, 1.0)
 """Share of dim scenes; the brightest light of dim and of other scenes [spikes/frame], even in its logarithm."""
 
@@ -176,6 +179,8 @@ class SimulatedStreams:
         bank: default, drawn from the seed.
         compiled: the light by `torch.compile` (a GPU's kernels are then few; other rounding).
         twins: the spikes that are simulated, of TWINS; the same bits whether the other is or not.
+        panned: share of the scenes before a camera that pans, so that all layers move, still ones too.
+        weak: share of the layers whose texture has a WEAK_CONTRAST.
 
     Raises:
         InputError: the patch is larger than the bank's units.
@@ -194,7 +199,10 @@ class SimulatedStreams:
         bank: Bank | None = None,
         compiled: bool = False,
         twins: tuple[str, ...] = TWINS,
+        panned: float = 0.0,
+        weak: float = 0.0,
     ) -> None:
+        self._panned, self._weak = panned, weak
         self.device, self.twins = torch.device(device), twins
         self.count, self.patch = count, patch
         self.bank = Bank.drawn(seed, self.device) if bank is None else bank
@@ -263,6 +271,10 @@ class SimulatedStreams:
         speed = (self._uniform(0, 1, count) >= STILL) * torch.exp(self._uniform_logarithm(SPEEDS, count))
         levels = self._levels(count)
         velocity = self._velocity(speed)
+        if self._panned:
+            velocity = velocity + self._pan(count)
+        if self._weak:
+            levels = self._weakened(levels)
         extent = self._uniform(*EXTENTS, *layers, 2) * self.patch
         spin = self._spin(speed, torch.hypot(extent[..., 0], extent[..., 1]))
         return {
@@ -297,6 +309,19 @@ class SimulatedStreams:
         pace = torch.where(moves, speed[:, None] * self._uniform(0, 1, count, SHAPES + 1), 0.0)
         heading = self._uniform(0, 2 * math.pi, count, SHAPES + 1)
         return torch.stack([pace * torch.cos(heading), pace * torch.sin(heading)], dim=-1)
+
+    def _pan(self, count: int) -> Tensor:
+        """Velocity of all layers of each scene before a panning camera, else 0, (B, 1, 2) [pixels/frame]."""
+        speed = torch.exp(self._uniform_logarithm(SPEEDS, count)) * (self._uniform(0, 1, count) < self._panned)
+        heading = self._uniform(0, 2 * math.pi, count)
+        return torch.stack([speed * torch.cos(heading), speed * torch.sin(heading)], dim=-1)[:, None]
+
+    def _weakened(self, levels: Tensor) -> Tensor:
+        """Levels (B, layers, 2), some of them of weak texture, no brighter than they were."""
+        count = levels.shape[:2]
+        contrast = 1 + torch.exp(self._uniform_logarithm(WEAK_CONTRAST, *count))
+        weak = torch.stack([levels[..., 0], levels[..., 0] / contrast], dim=-1)
+        return torch.where((self._uniform(0, 1, *count) < self._weak)[..., None], weak, levels)
 
     def _spin(self, speed: Tensor, radius: Tensor) -> Tensor:
         """Turn of each layer, whose rim is no faster than the fastest layer, (B, layers) [radians/frame]."""

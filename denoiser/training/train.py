@@ -100,6 +100,8 @@ def _begun(config: TrainConfig) -> Run:
         network = started(recipe, config.start, config.seed, config.patch)
     else:
         network = config.source.networks(recipe)
+    if config.layers == "last" and isinstance(network, StreamDnSS):
+        network.only_last_learn()
     run = Run.begin(network.to(config.device, memory_format=torch.channels_last))  # type: ignore[call-overload]
     if goes_on:
         run.load(config.out / RUN_FILE)
@@ -110,6 +112,9 @@ def _begun(config: TrainConfig) -> Run:
 def _own(config: TrainConfig) -> dict[str, Any]:
     """Arguments of the streams that not every source has; InputError for a teacher of other windows."""
     recipe, teacher, own = config.recipe, config.teacher, _recorded(config)
+    if config.source is Rollouts:
+        own |= {name: getattr(config, name) for name in ("layers", "seams")}
+        own |= {} if config.recordings else {name: getattr(config, name) for name in ("panned", "weak")}
     if not isinstance(recipe, Recipe) or teacher is None:
         return own if config.frames_a_step is None else own | {"frames_a_step": config.frames_a_step}
     found, network, _ = load_weights(teacher)

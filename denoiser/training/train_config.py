@@ -86,6 +86,14 @@ class TrainConfig:
     ship.  A network with more channels, or with the refine module, is made smaller (`smaller`)."""
     teacher: Annotated[str | None, _weights] = None
     """Of `best` and `fast`: weights whose rates the network is to learn instead of the light, a file or "best"."""
+    layers: Annotated[str, _layers] = OF_MODE
+    """Of `best` and `fast`: those that learn, "all" or "last" (`stream_network.LAST`)."""
+    seams: Annotated[float, Range(0, 1000).check] = OF_MODE
+    """Of `best` and `fast`: weight of steps from pass to pass in the loss (`rollout`), 0 without the option."""
+    panned: Annotated[float, Range(0, 1).check] = OF_MODE
+    """Of `best` and `fast`: share of the scenes before a camera that pans."""
+    weak: Annotated[float, Range(0, 1).check] = OF_MODE
+    """Of `best` and `fast`: share of the layers of scenes whose texture is weak."""
     width: Annotated[int | None, _width] = None
     """Channels of a reconstructor; None: the recipe's."""
     recordings: Annotated[tuple[str, ...], _recordings] = ()
@@ -110,6 +118,8 @@ class TrainConfig:
             object.__setattr__(self, "channels", self.recipe.channels)  # type: ignore[union-attr]
         if WholeRange(source.sides[0], source.sides[-1]).check(self.patch, "patch") not in source.sides:
             raise InputError(f"patch is {self.patch}; it must be a multiple of {source.sides.step}")
+        if self.layers == "last" and self.start is None:
+            raise InputError("layers is 'last'; say from which weights the other layers come with start, e.g. best")
         checked_device(self.device, "train with --device cpu")
         if self.compiled:
             checked_compiler(self.device)
@@ -157,6 +167,12 @@ def _recordings(value: Any, name: str) -> tuple[str, ...]:
     return tuple(map(str, value))
 
 
+def _layers(value: Any, _: str) -> str:
+    if value not in ("all", "last"):
+        raise unknown_name("layers", value, ("all", "last"))
+    return str(value)
+
+
 def _width(value: Any, _: str) -> int:
     return reconstructor_recipe("ssml", value).width
 
@@ -196,6 +212,8 @@ def command(config: TrainConfig) -> str:
     """The command line that trains so; OUT stands for the folder."""
     defaults = _defaults(config)
     given = {name: value for name, value in vars(config).items() if name in defaults and value != defaults[name]}
+    if config.minutes is not None:
+        given.pop("steps", None)  # it ends no such run
     options = (_option(name, value) for name, value in given.items() if name != "mode")
     return " ".join(["spikecam train", f"--mode {config.mode}", "--out OUT", *options])
 

@@ -85,6 +85,7 @@ class StreamSource(TrainingSource):
         compiled: as for `SimulatedStreams`.
         recordings: from which streams are cut instead of being simulated.
         held_out: whether these are for validation (`recorded.py`).
+        scenes: shares of simulated scenes that are panned, and of weak texture, as for `SimulatedStreams`.
     """
 
     pool: ClassVar[int] = 1
@@ -103,13 +104,15 @@ class StreamSource(TrainingSource):
         compiled: bool = False,
         recordings: Sequence[TwinRecording] = (),
         held_out: bool = False,
+        **scenes: float,
     ) -> None:
         self.taken = taken
         count = taken * (self.pool if pool is None else pool)
         if recordings:
             self.streams = RecordedStreams(list(recordings), held_out, count, patch, device, seed, self.twins)
         else:
-            self.streams = SimulatedStreams(count, patch, device, seed, bank=bank, compiled=compiled, twins=self.twins)
+            drawn: dict[str, Any] = {"bank": bank, "compiled": compiled, "twins": self.twins, **scenes}
+            self.streams = SimulatedStreams(count, patch, device, seed, **drawn)
         self._type = number_type("auto", device)
         self._next = torch.zeros((), dtype=torch.int64, device=device)
 

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
 
 import tyro
 
 from spikecam_env.cli.camera import CameraOptions
 from spikecam_env.cli.options import Size
+from spikecam_env.cli.without_effect import WithoutEffect
 from spikecam_env.numbers import Count, Positive, Seed, Whole, Workers
 
 if TYPE_CHECKING:
@@ -35,6 +36,10 @@ class DatasetOptions:
     """Worker processes on this machine, or workers of a local Ray cluster."""
     ray: Annotated[str | None, tyro.conf.arg(metavar="ADDRESS")] = None
     """Work on a Ray cluster: its address, e.g. auto or ray-head:6379; `local` starts one of --jobs workers here."""
+
+    without_effect: ClassVar = (
+        WithoutEffect(("jobs",), lambda c: c.ray not in (None, "local"), "the cluster {ray} has its own workers"),
+    )
 
     def settings(self) -> dict[str, Any]:
         """As fields of a `Plan`."""

@@ -7,11 +7,12 @@ import sys
 import webbrowser
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, ClassVar
 
 from spikecam_env.cli.camera import CameraOptions
 from spikecam_env.cli.mode_weights import Mode
 from spikecam_env.cli.options import Size
+from spikecam_env.cli.without_effect import WithoutEffect
 from spikecam_env.numbers import Count, Rpm, Seed
 
 if TYPE_CHECKING:
@@ -50,6 +51,8 @@ class Demo:
     """Seed of the camera unit, its noise, and the scene."""
     open: bool = True
     """Show the result in the desktop's viewer, if the command runs in a terminal of a desktop."""
+
+    without_effect: ClassVar = (WithoutEffect(("rpm",), lambda c: c.scene != "disk", "{scene} has a speed of its own"),)
 
     def run(self) -> None:
         from spikecam_env.cli.files import out_folder

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any, ClassVar, Literal
 
 import tyro
 
 from spikecam_env.cli.mode_weights import Brightness, Mode, brightness_for
 from spikecam_env.cli.reading import ReadingOptions
+from spikecam_env.cli.without_effect import WithoutEffect
 from spikecam_env.numbers import Count, Whole
 
 if TYPE_CHECKING:
@@ -45,6 +46,8 @@ class Denoise:
     Pictures of the rate are of one frame."""
     overlap: bool = False
     """Not for `paper`: passes that overlap by half: less error, no seams, twice the time."""
+    ease: bool = False
+    """Not for `paper`: ease each pass into the next: half the flicker at their seams, in the same time."""
     calibration: Path | None = None
     """Not for `paper`: maps.h5 of `spikecam calibrate`, or its folder: the camera's fixed pattern is then taken out."""
     first: Whole = 0
@@ -57,6 +60,11 @@ class Denoise:
     film: bool = True
     """Also write film.mp4, noisy beside denoised: at most 240 pictures, evenly over the recording."""
     reading: ReadingOptions = field(default_factory=ReadingOptions)
+
+    without_effect: ClassVar = (
+        WithoutEffect(("mode",), lambda c: c.weights is not None, "--weights says which network"),
+        WithoutEffect(("ease",), lambda c: c.overlap, "passes that overlap have no seams"),
+    )
 
     def run(self) -> None:
         from spikecam_env.cli.files import out_folder, write_json
@@ -102,7 +110,8 @@ class Denoise:
         noisy = recording.spikes
         window = checked_window(self.window, len(noisy))
         light = light_at(self.file, whole_windows(len(noisy), window), noisy.shape[1:], self.first)
-        options: dict[str, Any] = {"overlap": self.overlap, "unit": self.calibration, "engine": self.engine}
+        options: dict[str, Any] = {"overlap": self.overlap, "ease": self.ease}
+        options |= {"unit": self.calibration, "engine": self.engine}
         options["brightness"] = brightness_for(self.brightness, noisy)
         if self.weights is None:
             online = OnlineDnSS.pretrained(self.mode, output="both", **options)
@@ -126,7 +135,7 @@ class Denoise:
 
     def _write_stream(self, folder: Path, recording: Recording, found: DenoisedRecording) -> None:
         from spikecam_env.streams import SpikeWriter
-        from spikecam_env.streams.recording import BRIGHTNESS
+        from spikecam_env.streams.hdf5 import BRIGHTNESS
 
         attributes = {k: v for k, v in recording.attributes.items() if k in ("model", "seed", "scene")}
         attributes |= {"denoiser": self._name, "source": self.file.name, "first": self.first}

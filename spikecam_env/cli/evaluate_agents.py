@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from dataclasses import MISSING, dataclass, fields, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, ClassVar
 
 import tyro
 
 from spikecam_env.cli.options import Size
+from spikecam_env.cli.without_effect import WithoutEffect
 from spikecam_env.errors import unknown_name
 from spikecam_env.numbers import WholeRange, Workers
 
@@ -88,6 +89,16 @@ class Agents:
     """Write NAME.json too, an entry of the leaderboard (docs/leaderboard.md)."""
     films: bool = False
     """Write a film of the first test episode of each, TASK-NAME-SEED.mp4, of the first seed."""
+
+    without_effect: ClassVar = (
+        WithoutEffect(
+            ("tasks", "observations", "levels", "trained_levels", "learners", "seeds", "steps", "episodes"),
+            lambda c: c.suite is not None,
+            "the suite {suite} says which",
+        ),
+        WithoutEffect(("imitate",), lambda c: "ppo" not in c.learners, "only ppo can imitate"),
+        WithoutEffect(("jobs",), lambda c: c.ray not in (None, "local"), "the cluster {ray} has its own workers"),
+    )
 
     def run(self) -> None:
         (self if self.suite is None else self._of_suite(self.suite))._run()

@@ -3,13 +3,25 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, ClassVar, get_args
 
 import tyro
 
 from spikecam_env.cli.mode_weights import Denoiser, Mode, ModeWeights, Reconstruction
+from spikecam_env.cli.without_effect import WithoutEffect
 from spikecam_env.numbers import Positive, Seed, WholeRange, Workers
+
+
+def _is_not_evaluated(mode: str, command: Any) -> bool:
+    return all(one.partition("-")[0] != mode for one in command.modes)
+
+
+UNUSED_WEIGHTS = tuple(
+    WithoutEffect((mode,), partial(_is_not_evaluated, mode), f"--modes has no {mode}") for mode in get_args(Mode)
+)
+"""Weights of modes that are not evaluated."""
 
 
 @dataclass
@@ -30,6 +42,8 @@ class Quick:
     seed: Seed = 0
     """Seed of the held-out scenes, cameras and noise."""
     weights: ModeWeights = field(default_factory=ModeWeights)
+
+    without_effect: ClassVar = UNUSED_WEIGHTS
 
     def run(self) -> None:
         from denoiser.evaluate import evaluate_quick, report
@@ -63,6 +77,8 @@ class SpikeZoo:
     """Worker processes, one thread each; 1 works in this one, with all threads."""
     weights: ModeWeights = field(default_factory=ModeWeights)
 
+    without_effect: ClassVar = UNUSED_WEIGHTS
+
     def run(self) -> None:
         from denoiser.evaluate.spikezoo import evaluate_spikezoo, report
 
@@ -95,6 +111,8 @@ class TruthTests:
     seed: Seed = 0
     """Seed of the simulated scenes, cameras and noise."""
     weights: ModeWeights = field(default_factory=ModeWeights)
+
+    without_effect: ClassVar = UNUSED_WEIGHTS
 
     def run(self) -> None:
         from denoiser.evaluate.truth import evaluate_truth, report

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 
 import tyro
 
 from spikecam_env.cli.options import Size
+from spikecam_env.cli.without_effect import WithoutEffect
 from spikecam_env.errors import InputError
 from spikecam_env.numbers import Count, Range, WholeRange, Workers
 
@@ -22,6 +24,20 @@ FASTEST = 100.0
 """Pixels a frame; a picture of 400 is crossed in 4 frames."""
 
 
+OWN_WEIGHTS = {"paper": "paper", "no_refine": "paper-no-refine", "best": "best"}
+"""Name of the weights that an option gives."""
+
+
+def _has_no_row_of(weights: str, options: TableOptions) -> bool:
+    """Whether no row of a table is made with these weights."""
+    from denoiser.evaluate.flow import FLOW_TABLE
+    from denoiser.evaluate.rows import ROWS, weights_of
+    from denoiser.evaluate.tables import TABLES
+
+    rows = options.rows or {**TABLES, "flow": FLOW_TABLE}[options.table].rows
+    return all(weights_of(ROWS[row].source) != weights for row in rows if row in ROWS)
+
+
 @dataclass
 class TableOptions:
     """Options of every table."""
@@ -30,8 +46,8 @@ class TableOptions:
     """Folder for the table as text, JSON and a page of pictures; a run that was stopped goes on in it."""
     rows: Annotated[tuple[str, ...], tyro.conf.arg(metavar="ROW...", help_behavior_hint="(default: the table's)")] = ()
     """Rows to show, of noisy, tfp, ssml, spk2img-clean, spk2img-noisy, baseline-held, baseline-mus, baseline,
-    paper-held, paper-mus, paper, fast, best, best-overlap, best-map, best-bright, fast-bright, clean, light-held,
-    light-mus, light; noisy is always there."""
+    paper-held, paper-mus, paper, fast, best, best-overlap, best-eased, best-map, best-bright, fast-bright, clean,
+    light-held, light-mus, light; noisy is always there."""
     weights: Path | None = None
     """Folder whose paper.pt, paper-no-refine.pt, fast.pt, best.pt, spk2img-clean.pt, spk2img-noisy.pt and ssml.pt count
     before the shipped ones."""
@@ -44,6 +60,11 @@ class TableOptions:
     jobs: Workers = 1
     """Worker processes, one thread each; 1 works in this one, with all threads."""
 
+    without_effect: ClassVar = tuple(
+        WithoutEffect((option,), partial(_has_no_row_of, name), f"no row is made with weights of {name}")
+        for option, name in OWN_WEIGHTS.items()
+    )
+
     @property
     def table(self) -> str:
         """Its name: `table1`, ..., `still`."""
@@ -53,7 +74,7 @@ class TableOptions:
         """The files that were given."""
         from denoiser.evaluate.rows import Weights
 
-        given = {"paper": self.paper, "paper-no-refine": self.no_refine, "best": self.best}
+        given = {name: getattr(self, option) for option, name in OWN_WEIGHTS.items()}
         if self.weights is not None and not self.weights.is_dir():
             raise InputError(f"--weights {self.weights}: there is no such folder")
         return Weights.found(self.weights, {name: path for name, path in given.items() if path is not None})
@@ -90,9 +111,21 @@ class OnScenes(TableOptions):
     data: Path | None = None
     """Dataset of `spikecam dataset phm-n` to take streams from, instead of simulating them."""
 
+    without_effect: ClassVar = (
+        *TableOptions.without_effect,
+        WithoutEffect(
+            ("size", "seeds", "intervals", "speeds", "frames", "pan"),
+            lambda c: c.data is not None,
+            "--data has streams of its own",
+        ),
+    )
+
     def run(self) -> None:
         from denoiser.evaluate.phm import SCENES
 
+        if self.data is not None:
+            self.show(scenes=self.scenes or SCENES, data=self.data)
+            return
         self.show(
             scenes=self.scenes or SCENES,
             shape=self.size,
@@ -101,7 +134,6 @@ class OnScenes(TableOptions):
             speeds=self.speeds,
             pan=self.pan,
             frames=self.frames,
-            data=self.data,
         )
 
 

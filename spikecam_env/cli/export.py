@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
 
 import tyro
 
 from spikecam_env.cli.mode_weights import Brightness, Mode, brightness_for
-from spikecam_env.errors import InputError
+from spikecam_env.cli.without_effect import WithoutEffect
 from spikecam_env.numbers import Count, Positive, Whole
 
 if TYPE_CHECKING:
@@ -57,15 +57,27 @@ class Export:
     """The stream goes through this denoiser first."""
     overlap: bool = False
     """With --denoise, but `paper`: passes that overlap by half: less error, twice the time."""
+    ease: bool = False
+    """With --denoise, but `paper`: passes eased into one another: half the flicker at their seams, in the same time."""
     brightness: Brightness = 1.0
     """With --denoise: spikes are made of rates times this, as of `spikecam denoise`; auto: a factor for each
     recording."""
 
+    without_effect: ClassVar = (
+        WithoutEffect(
+            ("overlap", "ease", "brightness"), lambda c: c.denoise is None, "nothing is denoised without --denoise"
+        ),
+        WithoutEffect(("ease",), lambda c: c.overlap, "passes that overlap have no seams"),
+        WithoutEffect(
+            ("frames", "clips", "first", "count", "rate", "bits"),
+            lambda c: c.layout == "scflow",
+            "SCFlow's layout has no such choice",
+        ),
+    )
+
     def run(self) -> None:
         from spikecam_env.cli.table import table
 
-        if self.denoise is None and (self.overlap or self.brightness != 1.0):
-            raise InputError("--overlap and --brightness are of a denoiser; add --denoise best, or leave them out")
         print(table(self._spikezoo() if self.layout == "spikezoo" else self._scflow()))
         print(f"wrote {self.out}" + (f"; white is {self.rate:g} spikes/frame" if self.layout == "spikezoo" else ""))
 
@@ -98,10 +110,6 @@ class Export:
     def _scflow(self) -> list[dict[str, Any]]:
         from spikecam_env.datasets.export import export_scflow
 
-        for name in ("frames", "clips", "first", "count", "rate", "bits"):
-            default = next(field.default for field in fields(self) if field.name == name)
-            if getattr(self, name) != default:
-                raise InputError(f"--{name} {getattr(self, name)}: SCFlow's layout has no such choice; leave it out")
         done = export_scflow(self.sources, self.out, stream=self.stream, restore=self._restore, progress=True)
         return [
             {
@@ -125,7 +133,8 @@ class Export:
 
         assert self.denoise is not None
         brightness = brightness_for(self.brightness, spikes)
-        online = OnlineDnSS.pretrained(self.denoise, output="both", overlap=self.overlap, brightness=brightness)
+        joined = {"overlap": self.overlap, "ease": self.ease}
+        online = OnlineDnSS.pretrained(self.denoise, output="both", brightness=brightness, **joined)
         found, _, _ = restore(spikes, online, ())
-        how = {"mode": self.denoise, "overlap": self.overlap, "brightness": brightness, "saturated": online.saturated}
+        how = {"mode": self.denoise, **joined, "brightness": brightness, "saturated": online.saturated}
         return found, how

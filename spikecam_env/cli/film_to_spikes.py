@@ -6,12 +6,13 @@ import math
 import warnings
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any, ClassVar, Literal
 
 import tyro
 
 from spikecam_env.cli.camera import CameraOptions
 from spikecam_env.cli.options import Size
+from spikecam_env.cli.without_effect import WithoutEffect
 from spikecam_env.errors import InputError
 from spikecam_env.numbers import LARGEST_COUNT, Count, Positive, Seed, Whole
 
@@ -68,6 +69,8 @@ class FilmToSpikes:
     """Also keep the spikes of the noise-free camera before the same light, in an .h5 file of twice the size: to train
     on."""
 
+    without_effect: ClassVar = (WithoutEffect(("seconds",), lambda c: c.frames is not None, "--frames says how long"),)
+
     def run(self) -> None:
         from scenes import VideoScene
         from spikecam_env.cli.recording import check_out, lit_frames, record_scene, size_and_time
@@ -103,8 +106,6 @@ class FilmToSpikes:
 
     def _limit(self, rate_hz: float) -> int | None:
         """Frames to record, where an option says so."""
-        if self.frames is not None and self.seconds is not None:
-            raise InputError(f"--frames {self.frames} --seconds {self.seconds:g}; give one of the two")
         if self.seconds is not None and not self.seconds * rate_hz <= LARGEST_COUNT:
             raise InputError(f"--seconds {self.seconds:g} are more frames than can be counted; give fewer")
         asked = self.frames if self.seconds is None else round(self.seconds * rate_hz)

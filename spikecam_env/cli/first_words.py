@@ -33,18 +33,22 @@ APPENDS = get_args(tyro.conf.UseAppendAction[str])[1]
 """Marks options that may be repeated."""
 
 
-def check_words(args: Sequence[str], commands: Mapping[str, type]) -> None:
+def check_words(args: Sequence[str], commands: Mapping[str, type]) -> set[str]:
     """Check names of commands and options.
 
     Args:
         args: the command line, without the program's name.
         commands: the class of options of each command, which may hold commands of its own.
 
+    Returns:
+        The options that are given, as they are written after the two dashes; of a switch its name without `no-`.
+
     Raises:
         InputError: a word is no command, the command does not have an option, or one is given twice and may not be.
     """
     said, choices, options = "spikecam", dict(commands), dict.fromkeys(ALWAYS, False)
-    given: list[str] = []
+    once: list[str] = []
+    given: set[str] = set()
     for word in args:
         if choices and not word.startswith("-"):
             if word not in choices:
@@ -56,10 +60,13 @@ def check_words(args: Sequence[str], commands: Mapping[str, type]) -> None:
             name = word[2:].partition("=")[0].replace("_", "-")
             if name and name not in options and not name.startswith(OF_THE_PARSER):
                 raise _unknown("option", name, f"`{said}`", options)
-            switch = name.removeprefix("no-") if f"no-{name.removeprefix('no-')}" in options else name
+            bare = name.removeprefix("no-")
+            switch = bare if {bare, f"no-{bare}"} <= set(options) else name
+            given.add(switch)
             if not options.get(switch):
-                given.append(f"--{switch}")
-    each_once(given, f"`{said}`")
+                once.append(f"--{switch}")
+    each_once(once, f"`{said}`")
+    return given
 
 
 def _unknown(kind: str, name: str, of: str, allowed: Iterable[str]) -> InputError:

@@ -6,14 +6,15 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Literal
+from typing import TYPE_CHECKING, Annotated, ClassVar, Literal
 
 import tyro
 
 from spikecam_env.cli.camera import CameraOptions
 from spikecam_env.cli.options import Size
 from spikecam_env.cli.reading import ReadingOptions
-from spikecam_env.errors import InputError, unknown_name
+from spikecam_env.cli.without_effect import WithoutEffect
+from spikecam_env.errors import unknown_name
 from spikecam_env.numbers import Count, Positive, Range, Rpm, Seed
 
 if TYPE_CHECKING:
@@ -73,6 +74,28 @@ class Live:
     camera: CameraOptions = field(default_factory=CameraOptions)
     reading: ReadingOptions = field(default_factory=ReadingOptions)
 
+    without_effect: ClassVar = (
+        WithoutEffect(("mode",), lambda c: c.weights is not None, "--weights says which network"),
+        WithoutEffect(("size", "rpm", "seed", "camera"), lambda c: not c.is_scene, "{source} is no scene"),
+        WithoutEffect(("rpm",), lambda c: c.source != "disk", "{source} has a speed of its own"),
+        WithoutEffect(("loop", "reading"), lambda c: c.is_scene, "{source} is a scene, and no file"),
+        WithoutEffect(("speed",), lambda c: c.is_flow, "{source} has a pace of its own"),
+    )
+
+    @property
+    def is_scene(self) -> bool:
+        """Whether it is a scene of the catalogue."""
+        from scenes.catalogue import SCENES
+
+        return self.source in SCENES
+
+    @property
+    def is_flow(self) -> bool:
+        """Whether it is a pipe or a socket."""
+        from spikecam_env.streams.sources import is_flow
+
+        return is_flow(self.source)
+
     def run(self) -> None:
         from denoiser.live import LiveDnSS
         from denoiser.live.session import PICTURES_S, Session
@@ -107,19 +130,17 @@ class Live:
         from spikecam_env.cli.live.simulated import SimulatedSource
         from spikecam_env.cli.named_scene import scene_named
         from spikecam_env.sensor import SpikeSensor
-        from spikecam_env.streams.sources import StoredFrames, is_flow, open_source
+        from spikecam_env.streams.sources import StoredFrames, open_source
 
-        if self.source in SCENES:
+        if self.is_scene:
             model = self.camera.load()
             scene = scene_named(self.source, self.size, self.seed, model.frame_rate_hz, self.rpm)
             sensor = SpikeSensor(model, self.size, self.seed, engine="auto")
             yield SimulatedSource(self.source, scene, sensor, self.speed or 1.0)
             return
-        if not Path(self.source).suffix and not is_flow(self.source):
+        if not Path(self.source).suffix and not self.is_flow:
             raise unknown_name("scene, file or address", self.source, SCENES)
         with open_source(self.source, loop=self.loop, **self.reading.options()) as source:
-            if not source.waits and self.speed is not None:
-                raise InputError(f"--speed {self.speed:g}: {source.title} has a pace of its own; leave --speed")
             if isinstance(source, StoredFrames):
                 _say_if_read_slowly(source, self.speed or 1.0)
             yield source

@@ -31,6 +31,7 @@ from spikecam_env.cli.scenes import Scenes
 from spikecam_env.cli.train import Train
 from spikecam_env.cli.train_agent import TrainAgent
 from spikecam_env.cli.view import ViewCommand
+from spikecam_env.cli.without_effect import refuse_without_effect
 from spikecam_env.errors import InputError
 from spikecam_env.stopping import Stopped
 from spikecam_env.version import __version__
@@ -82,13 +83,19 @@ def run(args: list[str] | None = None) -> int:
 
 
 def understood(words: list[str]) -> Any:
-    """The command of a line, an instance of one of COMMANDS, not run yet; exits where there is none."""
-    check_words(words, COMMANDS)
+    """The command of a line, an instance of one of COMMANDS, not run yet; exits where there is none.
+
+    Raises:
+        InputError: wrong words, or an option that has no effect beside the others.
+    """
+    given = check_words(words, COMMANDS)
     union: Any = None
     for name, options in COMMANDS.items():
         command_type: Any = Annotated[options, tyro.conf.subcommand(name)]
         union = command_type if union is None else Union[union, command_type]  # noqa: UP007
-    return tyro.cli(union, prog="spikecam", description=DESCRIPTION, args=words, config=(tyro.conf.OmitArgPrefixes,))
+    command = tyro.cli(union, prog="spikecam", description=DESCRIPTION, args=words, config=(tyro.conf.OmitArgPrefixes,))
+    refuse_without_effect(command, given)
+    return command
 
 
 def run_parsed(parse: Callable[[], Any]) -> int:

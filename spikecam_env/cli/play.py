@@ -6,12 +6,13 @@ from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass, field
 from itertools import count
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
 
 import tyro
 
 from spikecam_env.cli.camera import CameraOptions
 from spikecam_env.cli.options import Size
+from spikecam_env.cli.without_effect import WithoutEffect
 from spikecam_env.errors import InputError
 from spikecam_env.numbers import Range, Seed, WholeRange
 
@@ -67,6 +68,17 @@ class Play:
     size: Size | None = None
     """Rows and columns, instead of the environment's."""
     camera: CameraOptions = field(default_factory=CameraOptions)
+
+    without_effect: ClassVar = (
+        WithoutEffect(("split",), lambda c: not c.has_splits, "{id} has no training and test episodes"),
+    )
+
+    @property
+    def has_splits(self) -> bool:
+        """Whether there are training and test episodes."""
+        from spikecam_env.cli.live.episodes import has_splits
+
+        return has_splits(self.id)
 
     def run(self) -> None:
         from spikecam_env.cli.files import check_place

@@ -5,9 +5,11 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import ClassVar
 
 from spikecam_env.cli.camera import CameraOptions
 from spikecam_env.cli.options import Size
+from spikecam_env.cli.without_effect import WithoutEffect
 from spikecam_env.numbers import Count, Rpm, Seed, Whole
 
 
@@ -34,6 +36,8 @@ class Record:
     truth_every: Whole | None = None
     """Frames between ground truths (radiance, flow, object number ...) in an .h5 file; 0: none.  Default: the frame in
     the middle alone, beside which `spikecam denoise` shows its pictures."""
+
+    without_effect: ClassVar = (WithoutEffect(("rpm",), lambda c: c.scene != "disk", "{scene} has a speed of its own"),)
 
     def run(self) -> None:
         from spikecam_env.cli.named_scene import scene_named

@@ -5,11 +5,12 @@ from __future__ import annotations
 import sys
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, ClassVar
 
 import tyro
 
 from spikecam_env.cli.options import Size
+from spikecam_env.cli.without_effect import WithoutEffect
 from spikecam_env.errors import InputError, unknown_name
 from spikecam_env.numbers import Count, Seed
 
@@ -43,6 +44,13 @@ class Scenes:
     """Length of the film in frames of the camera; 40 000 are a second."""
     every: Count = 32
     """Camera frames from picture to picture: 32 is 50 times slower than life at 25 pictures a second."""
+
+    without_effect: ClassVar = (
+        WithoutEffect(("frames", "every"), lambda c: c.film is None, "it is of a film, and there is no --film"),
+        WithoutEffect(
+            ("size", "seed"), lambda c: c.film is None and c.out is None, "there is no picture without --film or --out"
+        ),
+    )
 
     def run(self) -> None:
         from scenes.catalogue import SCENES

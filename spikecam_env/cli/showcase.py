@@ -74,7 +74,7 @@ def stream(
 
     Args:
         scene: "disk", or another name of the catalogue.
-        rpm: speed of the disk; default 2000.
+        rpm: speed of the disk; default 2000; of no other scene.
         frames: length of the stream.
         mode: of the denoiser.
         model: of the sensor.
@@ -83,7 +83,7 @@ def stream(
         least: fewest frames that can be shown, FILM_FRAMES or PICTURE_FRAMES.
 
     Raises:
-        InputError: fewer frames, an unknown scene, or rpm with another scene than the disk.
+        InputError: fewer frames, or an unknown scene.
     """
     if frames < least:
         raise InputError(f"{frames} frames are too few to show; ask for {least} or more (1200 are a turn at 2000 rpm)")
@@ -120,8 +120,6 @@ def _camera(
     if scene == "disk":
         env = gymnasium.make("spikecam_env/RotatingDisk-v0", shape=shape, rpm=2000.0 if rpm is None else rpm, **options)
         return env, {"centre": ((shape[1] - 1) / 2, (shape[0] - 1) / 2), "drift_px_s": (0.0, 0.0)}
-    if rpm is not None:
-        raise InputError(f"--rpm {rpm:g} is the disk's speed; the scene {scene!r} has its own")
     env = gymnasium.make("spikecam_env/Scene-v0", scene=scene, shape=shape, scene_seed=seed, **options)
     start: dict[str, Any] = {"start_frame": 0, "offset": (0.0, 0.0)}
     return env, start | ({"seed": seed} if scene == "random" else {})

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated, ClassVar, Literal
 
+from spikecam_env.cli.without_effect import WithoutEffect
 from spikecam_env.numbers import Count, Positive, Range, Seed, WholeRange, Workers
 
 
@@ -55,6 +56,14 @@ class Train:
     teacher: str | None = None
     """Weights whose rates `best` or `fast` learns instead of the true light, as a small network does better: a file, or
     `best`."""
+    layers: Literal["all", "last"] | None = None
+    """Layers of `best` or `fast` that learn: all, or, of weights to begin from, the last."""
+    seams: Annotated[float, Range(0.0, 1000.0)] | None = None
+    """Weight of the steps from pass to pass in the loss of `best` or `fast`.  Default: 0."""
+    panned: Annotated[float, Range(0.0, 1.0)] | None = None
+    """Share of the simulated scenes of `best` or `fast` before a camera that pans.  Default: 0."""
+    weak: Annotated[float, Range(0.0, 1.0)] | None = None
+    """Share of the layers of these scenes whose texture is weak.  Default: 0."""
     width: Count | None = None
     """Channels of a reconstructor, a multiple of 12 up to 252.  Default: 48."""
     frames_a_step: Count | None = None
@@ -67,6 +76,13 @@ class Train:
     """Compile the simulated light on a processor too: faster steps, after a minute; needs a C++ compiler."""
     resume: bool = True
     """Continue from the folder's checkpoint, if there is one."""
+
+    without_effect: ClassVar = (
+        WithoutEffect(("steps",), lambda c: c.minutes is not None, "--minutes says when the training ends"),
+        WithoutEffect(
+            ("panned", "weak", "compiled"), lambda c: c.recordings, "streams of --recordings are not simulated"
+        ),
+    )
 
     def run(self) -> None:
         from denoiser.training.train import TrainConfig, train

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Literal
+from typing import TYPE_CHECKING, Annotated, ClassVar, Literal
 
 import tyro
 
@@ -14,6 +14,7 @@ from spikecam_env.checked import checked_memory
 from spikecam_env.cli.camera import CameraOptions
 from spikecam_env.cli.options import Size
 from spikecam_env.cli.reading import ReadingOptions
+from spikecam_env.cli.without_effect import WithoutEffect
 from spikecam_env.errors import InputError, unknown_name
 from spikecam_env.numbers import Count, Seed
 
@@ -59,6 +60,35 @@ class ViewCommand:
     camera: CameraOptions = field(default_factory=CameraOptions)
     reading: ReadingOptions = field(default_factory=ReadingOptions)
 
+    without_effect: ClassVar = (
+        WithoutEffect(("policy", "split"), lambda c: not c.is_episode, "{what} is no environment"),
+        WithoutEffect(("seed", "size", "camera"), lambda c: c.is_file, "{what} is a file, of what a camera saw"),
+        WithoutEffect(("reading",), lambda c: not c.is_file, "{what} is no file"),
+        WithoutEffect(("every",), lambda c: c.is_episode, "{what} gives a picture a step"),
+        WithoutEffect(("split",), lambda c: not c.has_splits, "{what} has no training and test episodes"),
+    )
+
+    @property
+    def is_episode(self) -> bool:
+        """Whether it is an environment."""
+        from spikecam_env.cli.live.episodes import is_environment
+
+        return is_environment(self.what)
+
+    @property
+    def has_splits(self) -> bool:
+        """Whether it has training and test episodes."""
+        from spikecam_env.cli.live.episodes import has_splits
+
+        return has_splits(self.what)
+
+    @property
+    def is_file(self) -> bool:
+        """Whether it is none of the names."""
+        from scenes.catalogue import SCENES
+
+        return not self.is_episode and self.what not in SCENES and bool(Path(self.what).suffix)
+
     def run(self) -> None:
         from spikecam_env.cli.live.rerun_log import recorded, watched
         from spikecam_env.cli.live.timeline import entries, pixel
@@ -90,7 +120,7 @@ class ViewCommand:
     @contextmanager
     def _stream(self) -> Iterator[Stream]:
         from scenes.catalogue import SCENES
-        from spikecam_env.cli.live.episodes import environment, full_name
+        from spikecam_env.cli.live.episodes import environment
         from spikecam_env.cli.live.players import player
         from spikecam_env.cli.live.streams import of_episode, of_recording
         from spikecam_env.envs.registration import ALL_TASKS, ENVIRONMENTS
@@ -98,7 +128,7 @@ class ViewCommand:
         ids = (*ENVIRONMENTS, *ALL_TASKS)
         if self.what in SCENES:
             yield self._scene()
-        elif full_name(self.what) in ids:
+        elif self.is_episode:
             acting = player(self.policy, self.what)
             size = {} if self.size is None else {"shape": self.size}
             env = environment(self.what, acting, model=self.camera.load(), split=self.split, **size)
@@ -106,7 +136,7 @@ class ViewCommand:
                 yield of_episode(self.what, env, acting, self.seed, self.frames or FRAMES)
             finally:
                 env.close()
-        elif Path(self.what).suffix:
+        elif self.is_file:
             yield of_recording(self.what, self.frames, self.every, **self.reading.options())
         else:
             names = (*SCENES, *(name.rpartition("/")[2] for name in ids))

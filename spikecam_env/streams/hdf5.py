@@ -18,7 +18,8 @@ from __future__ import annotations
 
 import math
 import sys
-from collections.abc import Collection, Iterator
+import warnings
+from collections.abc import Collection, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -32,6 +33,7 @@ from pydantic import ConfigDict
 
 from spikecam_env.checked import checked_number, checked_shape
 from spikecam_env.errors import InputError, NotReadyError, shown, unknown_name
+from spikecam_env.numbers import Range
 from spikecam_env.streams.packing import as_spikes, check_range, pack_checked, packed_bytes, unpack_frames
 from spikecam_env.streams.whole_hdf5 import WholeHDF5
 from spikecam_env.types import Spikes
@@ -49,6 +51,8 @@ from spikecam_env.version import __version__
 from spikecam_env.whole import check_file
 
 FORMAT = "spikecam-recording/1"
+BRIGHTNESS = "spike_brightness"
+"""Attribute of a recording whose spikes are more than its light gives: by this factor (`Recording.brightness`)."""
 HDF5 = (".h5", ".hdf5")
 """Endings of the names of HDF5 files."""
 CHUNK_FRAMES = 32
@@ -287,11 +291,23 @@ class _Header(Declared):
 
 @contextmanager
 def open_recording(path: str | Path) -> Iterator[OpenRecording]:
-    """The recording, open for reading inside the `with` block; raises InputError as `read_hdf5` does."""
+    """The recording, open for reading inside the `with` block; raises InputError as `read_hdf5` does.
+
+    Warns (UserWarning) where its spikes have another brightness than the light: whatever reads a recording comes here.
+    """
     with open_hdf5(path) as file:
         with _damage_named(path):
             recording = _opened(file, Path(path))
+        if (brightness := stated_brightness(recording.attributes)) != 1.0:
+            what = f"{path}: its spikes are {brightness:g} times as many as its light gives (attribute {BRIGHTNESS})"
+            warnings.warn(f"{what}; divide rates by that to have light", UserWarning, stacklevel=1)
         yield recording
+
+
+def stated_brightness(attributes: Mapping[str, Any]) -> float:
+    """Spikes of a recording over those that its light gives, 1 where its attributes do not say; InputError where they
+    state one that is no number above 0."""
+    return Range(0.0, above=True).check(attributes.get(BRIGHTNESS, 1.0), f"attribute {BRIGHTNESS}")
 
 
 def _opened(file: h5py.File, path: Path) -> OpenRecording:

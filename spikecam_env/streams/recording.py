@@ -2,21 +2,16 @@
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 from spikecam_env.errors import InputError
-from spikecam_env.numbers import Range
 from spikecam_env.streams.array_files import read_array_file
-from spikecam_env.streams.hdf5 import HDF5, is_recording, read_hdf5
+from spikecam_env.streams.hdf5 import BRIGHTNESS, HDF5, is_recording, read_hdf5, stated_brightness
 from spikecam_env.streams.vidar import read_dat, read_raw
 from spikecam_env.types import Spikes
-
-BRIGHTNESS = "spike_brightness"
-"""Attribute of a recording whose spikes are more than its light gives: by this factor (`Recording.brightness`)."""
 
 
 @dataclass(frozen=True)
@@ -42,7 +37,7 @@ class Recording:
         Raises:
             InputError: where the file states one that is no number above 0.
         """
-        return Range(0.0, above=True).check(self.attributes.get(BRIGHTNESS, 1.0), f"attribute {BRIGHTNESS}")
+        return stated_brightness(self.attributes)
 
     def __str__(self) -> str:
         """How it was read, e.g. `301 frames of 250 rows x 400 columns, flip`."""
@@ -88,11 +83,7 @@ def read_recording(path: str | Path, **options: Any) -> Recording:
     own = " of this package" if read is read_hdf5 else ""
     check_options(options, allowed, f"{Path(path).suffix.lower()} files{own}")
     spikes, attributes = read(path, **options)
-    recording = Recording(spikes, attributes.get("frame_rate_hz"), attributes)
-    if (brightness := recording.brightness) != 1.0:
-        what = f"{path}: its spikes are {brightness:g} times as many as its light gives (attribute {BRIGHTNESS})"
-        warnings.warn(f"{what}; divide rates by that to have light", UserWarning, stacklevel=2)
-    return recording
+    return Recording(spikes, attributes.get("frame_rate_hz"), attributes)
 
 
 def check_options(options: Iterable[str], allowed: tuple[str, ...], kind: str) -> None:

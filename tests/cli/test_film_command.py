@@ -177,7 +177,6 @@ def test_size_and_time_are_said_before_a_long_recording_and_change_nothing(tmp_p
         (("p", "--film-rate", "100", "--frames", "0"), "--frames 0; it must be"),
         (("p", "--film-rate", "100", "--frames", "9999"), "p lasts 800 (0.02 s)"),
         (("p", "--film-rate", "100", "--seconds", "nan"), "--seconds nan"),
-        (("p", "--film-rate", "100", "--seconds", "1", "--frames", "1"), "give one of the two"),
         (("p", "--film-rate", "100", "--clean", "--out", "x.dat"), "a clean twin (--clean) is kept in .h5 files only"),
         (("p", "--film-rate", "1e5"), "it must last 1 or more"),
         (("p", "--film-rate", "100", "--frame-rate", "0"), "frame_rate_hz = 0"),

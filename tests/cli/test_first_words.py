@@ -6,16 +6,9 @@ import re
 
 import pytest
 
-from spikecam_env.cli.first_words import START, commands_of, options_of
+from spikecam_env.cli.first_words import START, options_of
 from spikecam_env.cli.main import COMMANDS, run
-
-
-def every_command() -> dict[str, type]:
-    found = {}
-    for name, options in COMMANDS.items():
-        below = commands_of(options)
-        found |= {f"{name} {word}": kind for word, kind in below.items()} or {name: options}
-    return found
+from tests.commands import every_command
 
 
 def test_the_name_alone_prints_three_commands_to_begin_with(capsys) -> None:

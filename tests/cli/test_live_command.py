@@ -166,12 +166,6 @@ def test_a_wrong_size_of_a_pipes_frames_is_noticed(spikes: np.ndarray, capfd) ->
     assert "read as 24 x 48 pixels: " in (said := capfd.readouterr().err) and "frames look 120 bytes long" in said
 
 
-def test_a_pipe_has_a_pace_of_its_own(capfd) -> None:
-    with standard_input(b""):
-        assert spikecam("live", "-", "--speed", 1) == 2
-    assert "--speed 1: standard input has a pace of its own" in capfd.readouterr().err
-
-
 def test_a_server_that_breaks_off_ends_the_command_in_a_line(spikes: np.ndarray, capfd) -> None:
     server = socket.create_server(("127.0.0.1", 0))
 

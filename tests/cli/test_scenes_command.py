@@ -51,8 +51,6 @@ def test_record_takes_any_scene(tmp_path: Path, capsys) -> None:
         assert 0.05 < read_recording(tmp_path / f"{scene}.h5").spikes.mean() < 0.2
     assert spikecam("record", "--scene", "dise", "--out", tmp_path / "a.h5", *small) == 2
     assert "unknown scene 'dise'" in capsys.readouterr().err
-    assert spikecam("record", "--scene", "dice", "--rpm", 5, "--out", tmp_path / "a.h5", *small) == 2
-    assert "--rpm 5 is the disk's speed" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize(

@@ -123,10 +123,6 @@ def test_what_cannot_be_exported_is_refused_in_a_line_with_nothing_left(dataset:
         (disk, (), "is no folder of a dataset"),
         (tmp_path, (), "is no dataset"),
         (short, (), "two windows 20 frames apart need 160"),
-        (dataset, ("--rate", 1), "--rate 1.0: SCFlow's layout has no such choice"),
-        (dataset, ("--first", 8), "--first 8: SCFlow's layout has no such choice"),
-        (dataset, ("--count", 90), "--count 90: SCFlow's layout has no such choice"),
-        (dataset, ("--brightness", 4), "add --denoise"),
         (dataset, ("--denoise", "fast", "--brightness", 0), "brightness = 0"),
     ):
         capsys.readouterr()

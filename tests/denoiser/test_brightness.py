@@ -183,6 +183,27 @@ def test_figures_of_a_denoised_recording_are_in_light_whatever_its_brightness(di
         assert read_recording(dim.with_name("again") / "denoised.h5").brightness == 4.0
 
 
+@pytest.mark.parametrize(
+    "words",
+    [
+        ("denoise", "FILE", "--out", "restored", "--no-film", "--mode", "fast"),
+        ("live", "FILE", "--frames", 64, "--mode", "fast"),
+        ("view", "FILE", "--frames", 64, "--no-denoise", "--save", "seen.rrd"),
+        ("train", "--start", "best", "--recordings", "FILE", "--out", "run", "--steps", 1, "--patch", 16),
+        ("campaign", "import", "FOLDER", "campaign", "--label", "denoised.h5=unknown"),
+    ],
+    ids=lambda words: words[0],
+)
+def test_every_command_that_reads_a_recording_says_that_its_spikes_are_brighter(
+    words: tuple[object, ...], dim: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr("spikecam_env.cli.screen.window.has_display", lambda: False)
+    folder = dim.with_name("bright")
+    spikecam(*({"FILE": folder / "denoised.h5", "FOLDER": folder}.get(str(word), word) for word in words))
+    assert capsys.readouterr().err.count("denoised.h5: its spikes are 4 times as many as its light gives") == 1
+
+
 @pytest.mark.parametrize("brightness", ["0", "nan", "-4", "1e9", "inf"])
 def test_a_command_refuses_nonsense_in_a_line(brightness: str, dim: Path, capsys) -> None:
     assert spikecam("denoise", dim, "--out", dim.with_name("none"), "--brightness", brightness) == 2

@@ -44,7 +44,10 @@ def apart(found: np.ndarray, wanted: np.ndarray) -> float:
     return float(np.abs(found - wanted).max())
 
 
-@pytest.mark.parametrize("options", [{}, {"unit": MAP}, {"overlap": True}, {"engine": "captured"}], ids=str)
+OPTIONS = ({}, {"unit": MAP}, {"overlap": True}, {"ease": True}, {"engine": "captured"})
+
+
+@pytest.mark.parametrize("options", OPTIONS, ids=str)
 @pytest.mark.parametrize("frames", [9, 20, 47, 101])
 def test_rates_are_those_without_a_device(frames: int, options: dict) -> None:
     spikes, plain = stream(frames), {name: value for name, value in options.items() if name != "engine"}

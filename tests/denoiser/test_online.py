@@ -25,6 +25,7 @@ KINDS = {
     "stride": ("paper", {"stride": 3, "decoder": "mus"}),
     "best": ("best", {}),
     "overlap": ("best", {"overlap": True}),
+    "eased": ("best", {"ease": True}),
     "map": ("best", {"unit": MAP}),
 }
 MODES = tuple(KINDS)

@@ -187,6 +187,15 @@ def test_steps_across_passes_count(flats):
     assert right == pytest.approx(0, abs=1e-9) and new / stays == pytest.approx(1 + 0.5 / 16, rel=1e-3)
 
 
+def test_seams_weigh_as_they_are_told(monkeypatch):
+    """With 1, a step from pass to pass counts as much as the error that it brings, and a half of a sixteenth."""
+    monkeypatch.setattr(training_source, "SimulatedStreams", Flats)
+    flats = Rollouts(RECIPE, taken=2, patch=PATCH, device=CPU, seed=0, pool=1, seams=1.0)
+    flats.loss(Answers([0.25] * 16), 2)
+    new, stays = (float(flats.loss(Answers([0.26] * 16), 1)) for _ in range(2))
+    assert new / stays == pytest.approx(2 + 0.5 / 16, rel=1e-3)
+
+
 def test_half_of_the_streams_has_a_map_with_errors_of_a_thousandth_to_a_hundredth(bank):
     streams = Rollouts(RECIPE, taken=300, patch=PATCH, device=CPU, seed=0, pool=1, bank=bank)
     rows, windows = torch.arange(300), streams._windows

@@ -191,6 +191,24 @@ def test_the_mixture_of_scenes(scenes, name):
 
 
 @pytest.mark.slow
+def test_before_a_panning_camera_all_layers_move_alike(bank):
+    streams = SimulatedStreams(4000, 8, seed=1, bank=bank, panned=0.5)
+    velocity = streams._scene(4000)["velocity"]
+    moves = (velocity.norm(dim=-1) > 0).all(dim=1)
+    alike = (velocity - velocity[:, :1]).abs().amax(dim=(1, 2)) < 1e-6
+    print(f"all layers move in {moves.float().mean():.3f} of the scenes, alike in {(moves & alike).float().mean():.3f}")
+    assert 0.5 < moves.float().mean() < 0.62  # a few of the others move in all layers by themselves
+    assert (moves & alike).float().mean() > 0.14  # half of those at rest, STILL
+
+
+def test_weak_texture_is_no_brighter_and_hardly_darker(bank):
+    plain, weak = (SimulatedStreams(4000, 8, seed=1, bank=bank, weak=share)._scene(4000) for share in (0.0, 1.0))
+    contrast = weak["levels"][..., 0] / weak["levels"][..., 1] - 1
+    print(f"contrast {contrast.min():.4f} to {contrast.max():.4f}")
+    assert contrast.min() > 0.0199 and 0.28 < contrast.max() < 0.301
+    assert weak["levels"].amax() <= plain["levels"].amax() * 1.01 and plain["levels"].amin() > 0
+
+
 def test_a_stream_begins_anew_at_its_age(bank):
     streams = SimulatedStreams(8, 16, seed=2, bank=bank)
     ages, seen = torch.full((8,), -1), []

@@ -172,6 +172,20 @@ def test_a_network_learns_the_rates_of_a_teacher(small, tmp_path):
     assert "--teacher best" in load_weights(tmp_path / "best.pt")[2]["command"]
 
 
+def test_the_last_layers_learn_alone(small, tmp_path):
+    options = {"start": "best", "layers": "last", "seams": 1.0, "panned": 0.5, "weak": 0.5}
+    learnt = weights_after(tmp_path / "last", 3, **options)
+    shipped = load_weights(pretrained_path("best"))[1].state_dict()
+    changed = {name.partition(".")[0] for name in shipped if not torch.equal(learnt[name], shipped[name])}
+    assert changed == {"join", "out", "head"}
+    resumed = weights_after(tmp_path / "last", 4, **options)
+    assert not same(resumed, learnt) and torch.equal(resumed["mix.0.weight"], shipped["mix.0.weight"])
+    with pytest.raises(InputError, match="layers is 'last'; say from which weights"):
+        TrainConfig(mode="best", layers="last")
+    with pytest.raises(InputError, match="unknown layers 'some'"):
+        TrainConfig(mode="best", start="best", layers="some")
+
+
 def test_a_teacher_of_another_mode_is_refused(small, tmp_path):
     with pytest.raises(InputError, match="weights of another mode; give a file of this mode"):
         train(TrainConfig(teacher="paper", out=tmp_path), progress=False)

@@ -25,6 +25,7 @@ from pytest import MonkeyPatch
 
 from spikecam_env.cli.main import run, understood
 from spikecam_env.cli.options import check_options
+from spikecam_env.errors import InputError
 from tools.page_blocks import COMMANDS, PYTHON, ROOT, Block, command_lines
 
 INSTALLED = f"{sys.executable} -m spikecam_env"
@@ -114,13 +115,22 @@ def reason_not_to_run(words: Sequence[str]) -> str:
 
 
 def at_small_size(words: Sequence[str]) -> list[str]:
-    """Options that make a command small, those apart that the line gives."""
+    """Options that make a command small, those apart that the line gives, and those that have no effect in it."""
     added: list[str] = []
     for command, options in SMALL.items():
         if begins(words[1:], command):
             for option in re.findall(r"--\S+(?: (?!--)\S+)*", options):
-                added += [] if option.split()[0] in words else option.split()
+                added += [] if option.split()[0] in words or not has_effect(words, option) else option.split()
     return added
+
+
+def has_effect(words: Sequence[str], option: str) -> bool:
+    """Whether a line of `spikecam` takes an option."""
+    try:
+        understood([*words[1:], *option.split()])
+    except InputError:
+        return False
+    return True
 
 
 def without(words: Sequence[str], options: Sequence[str]) -> list[str]:

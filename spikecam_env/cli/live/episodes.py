@@ -57,7 +57,7 @@ def environment(name: str, player: Player, **options: Any) -> gymnasium.Env[Any,
     full, known = full_name(name), {**ENVIRONMENTS, **ALL_TASKS}
     if full not in known:
         raise unknown_name("id", name, (each.split("/")[1] for each in known))
-    if full in ENVIRONMENTS:
+    if not has_splits(name):
         options.pop("split", None)
     env = gymnasium.make(full, **dict(player.sees), **options)
     numbers = env.action_space.shape[0]  # type: ignore[index]
@@ -69,6 +69,16 @@ def environment(name: str, player: Player, **options: Any) -> gymnasium.Env[Any,
 def full_name(name: str) -> str:
     """An id as gymnasium has it."""
     return name if "/" in name else f"spikecam_env/{name}"
+
+
+def is_environment(name: str) -> bool:
+    """Whether it is the id of an environment or a task."""
+    return full_name(name) in {**ENVIRONMENTS, **ALL_TASKS}
+
+
+def has_splits(name: str) -> bool:
+    """Whether an id has training and test episodes: those of version 1."""
+    return full_name(name) not in ENVIRONMENTS
 
 
 def episode(env: gymnasium.Env[Any, Any], player: Player, seed: int) -> Iterator[Moment]:
