@@ -43,7 +43,7 @@ KERNELS: Mapping[str, tuple[str, ...]] = {
     "statistics": ("gap.twins.case:statistics_bank", "gap.twins.case:pattern_bank"),
     "refits": ("gap.twins.case:free_refit",),
     "features of films": ("gap.twins.case:films",),
-    "drawn units": ("gap.baseline.null_model:drawn_banks", "gap.fit.predict:drawn_banks"),
+    "drawn units": ("gap.twins.case:drawn_banks",),
 }
 """Functions of `spikecam_env` by kernel, "module:name", where they are called by that name."""
 
