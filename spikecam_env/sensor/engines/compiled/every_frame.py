@@ -70,8 +70,8 @@ LONGEST_SCRATCH = _CHARGE + AT_ONCE * TILE
 
 
 @njit(inline="always")
-def pass_frame_by_frame(work: TileScratch, law: TileLaw, light: TileLight, frames: int) -> None:
-    """As `pass_from_spike_to_spike`, with the same bits."""
+def pass_frame_by_frame(work: TileScratch, law: TileLaw, light: TileLight, frames: int, dense: float) -> None:
+    """As `pass_from_spike_to_spike`, with the same bits; `dense` is not used."""
     s = work.s
     for j in range(TILE):
         s[_REACH + j] = s[X + j]

@@ -219,23 +219,30 @@ def _advance(
     stretches: Sequence[Stretch], outs: Sequence[NDArray[np.uint8]], packed: bool, threads: int | None
 ) -> None:
     """Advance cameras; outs: spikes of each as bits or as bytes (`tile_driver.advance`)."""
+    jobs = list(zip(stretches, outs, strict=True))
+    for often, advance in ((False, tile_driver.advance), (True, tile_driver.advance_often)):
+        if of_kind := [job for job in jobs if job[0].changes_often is often]:
+            work, steps = _table(of_kind, packed)
+            run_in_threads(advance, work, len(work[1]), steps, threads)
+
+
+def _table(jobs: Sequence[tuple[Stretch, NDArray[np.uint8]]], packed: bool) -> tuple[tuple[Any, ...], int]:
+    """The arguments of a loop for cameras and the arrays of their spikes, and the number of pixel-steps."""
     cameras, bands, done = [], [], 0
-    for number, (one, out) in enumerate(zip(stretches, outs, strict=True)):
+    for number, (one, out) in enumerate(jobs):
         pieces = done, done + len(one.pieces)
         table = one.state.addresses
-        numbers = *table.words, one.pixels, len(out), *pieces, one.changes_often
-        cameras.append((*table.arrays, address_of(out), *numbers))
+        cameras.append((*table.arrays, address_of(out), *table.words, one.pixels, len(out), *pieces))
         bands += [(number, band) for band in range(-(-one.state.remaining.size // tile_driver.WIDTH))]
         done = pieces[1]
     work = (
         np.array(cameras, np.int64),
         np.array(bands, np.int32),
-        np.concatenate([one.pieces for one in stretches]) if len(stretches) > 1 else stretches[0].pieces,
+        np.concatenate([one.pieces for one, _ in jobs]) if len(jobs) > 1 else jobs[0][0].pieces,
         np.float32(DENSE),
         packed,
     )
-    steps = sum(one.pixels * len(out) for one, out in zip(stretches, outs, strict=True))
-    run_in_threads(tile_driver.advance, work, len(bands), steps, threads)
+    return work, sum(one.pixels * len(out) for one, out in jobs)
 
 
 def stretches(

@@ -50,10 +50,11 @@ _GRAINS = _F(GRAINS)
 
 
 @njit(inline="always")
-def pass_from_spike_to_spike(work: TileScratch, law: TileLaw, light: TileLight, dense: float) -> None:
+def pass_from_spike_to_spike(work: TileScratch, law: TileLaw, light: TileLight, frames: int, dense: float) -> None:
     """Pass all frames of a tile's light: rows X, SPIKES, LOW, HIGH.
 
     Args:
+        frames: not used; the pieces say as much.
         dense: expected spikes a pixel and frame above which pixels are streamed.
     """
     s = work.s

@@ -38,9 +38,9 @@ _B = np.uint8
 _Q = np.uint64
 
 # Columns of a table of cameras: addresses of arrays, then numbers.
-CAMERA_COLUMNS = 14
+CAMERA_COLUMNS = 13
 GAIN, DARK, SPREAD_OF, POLYNOMIAL, REMAINING, FIRED, OUT = range(7)
-SEED_LOW, SEED_HIGH, PIXELS, FRAMES, FIRST_PIECE, STOP_PIECE, OFTEN = range(7, 14)
+SEED_LOW, SEED_HIGH, PIXELS, FRAMES, FIRST_PIECE, STOP_PIECE = range(7, 13)
 
 
 @njit(cache=True, nogil=True, error_model="numpy", boundscheck=False)
@@ -61,8 +61,7 @@ def advance(
         cameras: int64 (C, CAMERA_COLUMNS).  Addresses of gain, dark: float32 [grains/frame]; spread: float32 [grains];
             polynomial: 8 float32; remaining: int32 [grains] and fired: uint32, updated; out, overwritten.  All but
             polynomial and out are padded to whole tiles.  Then the seed's two words, pixels P, frames F (at most
-            MAX_SEGMENT), the first piece of the camera and the piece after its last, and whether its light changes
-            often, so that `every_frame` is faster.
+            MAX_SEGMENT), and the first piece of the camera and the piece after its last.
         bands: int32 (B, 2), every camera's bands: the camera, and which of its bands.
         pieces: int64 (S, PIECE_COLUMNS), those of a camera one after another, F frames together: addresses of the
             light at the start and at the end of a key interval, (P,) float32 each, its length, and which of its frames:
@@ -72,6 +71,29 @@ def advance(
             is byte p % 8 of word p // 8, 0 or 1.
     """
     use_widest_vectors()
+    drive(pass_from_spike_to_spike, worker, tickets, cameras, bands, pieces, dense, packed)
+
+
+@njit(cache=True, nogil=True, error_model="numpy", boundscheck=False)
+def advance_often(
+    worker: int,
+    tickets: NDArray[np.int64],
+    cameras: NDArray[np.int64],
+    bands: NDArray[np.int32],
+    pieces: NDArray[np.int64],
+    dense: float,
+    packed: bool,
+) -> None:
+    """As `advance`, with the same bits, of cameras whose light changes often; `dense` is not used."""
+    use_widest_vectors()
+    drive(pass_frame_by_frame, worker, tickets, cameras, bands, pieces, dense, packed)
+
+
+@njit(inline="always")
+def drive(
+    pass_tile: Any, worker: Any, tickets: Any, cameras: Any, bands: Any, pieces: Any, dense: Any, packed: Any
+) -> None:
+    """Let a loop pass the frames of all tiles of the bands that this thread gets hold of."""
     room = np.empty(ROOM, np.int64)
     work = scratch_in(room)
     pieces = borrowed(pieces)
@@ -85,10 +107,7 @@ def advance(
             light = TileLight(pieces, camera[FIRST_PIECE], camera[STOP_PIECE], pixels, p0, min(TILE, pixels - p0))
             left = tile_of(camera, REMAINING, p0, np.int32)
             begin_tile(work.s, left)
-            if camera[OFTEN]:
-                pass_frame_by_frame(work, law, light, frames)
-            else:
-                pass_from_spike_to_spike(work, law, light, dense)
+            pass_tile(work, law, light, frames, dense)
             end_tile(work.s, left, law.fired, planes, p0 - band * WIDTH, frames)
         start, words = band * (WIDTH // 8), (pixels + 7) // 8
         wide = min(WIDTH // 8, words - start)

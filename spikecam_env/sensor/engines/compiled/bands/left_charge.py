@@ -74,7 +74,7 @@ def add_left_charge(band: Views, live: Places, groups: int, number: int, once_mo
                 cross_again(band, j, number + x[AT + j], law)
 
 
-@njit(inline="always")
+@njit(nogil=True, error_model="numpy", boundscheck=False)
 def cross_again(band: Views, j: int, end: float, law: SpikeLaw) -> None:
     """Reset a pixel that charge left takes to its threshold again, MOST_AGAIN times at most."""
     x, draws = band.x, band.words.view(np.float32)

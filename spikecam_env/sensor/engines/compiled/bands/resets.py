@@ -92,7 +92,7 @@ def find_due(band: Views, live: Places, groups: int) -> None:
             words[DUE + j] = _U(x[HELD + j] >= x[LIMIT + j])
 
 
-@njit(inline="always")
+@njit(nogil=True, error_model="numpy", boundscheck=False)
 def reset_due(band: Views, live: Places, groups: int, law: SpikeLaw, keep: bool) -> int:
     """Reset the pixels that are due.
 
