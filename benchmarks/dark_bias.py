@@ -16,7 +16,6 @@ from typing import NamedTuple
 import numpy as np
 import torch
 import tyro
-from spikecam_env.sensor.kernels.fast import PixelLaw
 
 from denoiser.passes.recipe import recipe_of
 from denoiser.training.rollout import Rollouts
@@ -24,6 +23,7 @@ from denoiser.weights import load_weights
 from spikecam_env.cli.table import table
 from spikecam_env.numbers import Count, Seed
 from spikecam_env.sensor import SensorModel
+from spikecam_env.sensor.engines.compiled.fast import PixelLaw
 from spikecam_env.sensor.light import GRAINS
 
 LEAST_LIGHT = 0.03

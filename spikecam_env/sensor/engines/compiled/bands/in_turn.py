@@ -37,6 +37,7 @@ from spikecam_env.sensor.engines.compiled.bands.rows import (
 )
 from spikecam_env.sensor.engines.compiled.bands.within_frame import between, next_crossing, nodes_of, stands_at
 from spikecam_env.sensor.ground.crossing import NEVER
+from spikecam_env.sensor.ground.intrinsics import borrowed
 from spikecam_env.types import Floats
 
 Links = NDArray[np.int32]
@@ -96,6 +97,7 @@ def fire_in_turn(scratch: Floats, bits: Bytes, lines: Lines, turns: Turns, sway:
         sway: how references move in the frame.
         law: its kick in grains.
     """
+    turns = borrowed(turns)
     numbers, links = turns
     rows, columns, pixels = sway.loads.size, sway.columns, bits.size
     still = stands_still(sway)
@@ -127,7 +129,7 @@ def fire_in_turn(scratch: Floats, bits: Bytes, lines: Lines, turns: Turns, sway:
             if row + down < 0 or row + down >= rows or column + right < 0 or column + right >= columns:
                 continue
             q = p + down * columns + right
-            kicked, moment, taken = kick_at(scratch, turns, q, u, bits[q] != 0, sway, still, law)
+            kicked, moment, taken = kick_at(scratch, turns, q, u, bits, sway, still, law)
             if kicked:
                 leave(q, links)
                 numbers[q, _MOMENT], numbers[q, _TAKEN] = moment, taken
@@ -203,7 +205,7 @@ def fire_at(
 
 @njit(inline="always")
 def kick_at(
-    scratch: Floats, turns: Turns, q: int, u: float, fired: bool, sway: FrameSway, still: bool, law: SpikeLaw
+    scratch: Floats, turns: Turns, q: int, u: float, bits: Bytes, sway: FrameSway, still: bool, law: SpikeLaw
 ) -> tuple[bool, float, float]:
     """Kick pixel q at moment u.
 
@@ -217,7 +219,7 @@ def kick_at(
     moment, taken = NEVER, 0.0
     if x[HELD + j] >= x[LIMIT + j]:
         moment, taken = crossing_of(x, j, u, q, sway, still)
-    if moment == u and fired and turns.numbers[q, _LAST] == u:
+    if moment == u and bits[q] != 0 and turns.numbers[q, _LAST] == u:
         x[HELD + j], x[PHI + j], x[LIMIT + j] = held, phi, limit
         return False, moment, taken
     return True, moment, taken

@@ -92,7 +92,7 @@ def find_due(band: Views, live: Places, groups: int) -> None:
             words[DUE + j] = _U(x[HELD + j] >= x[LIMIT + j])
 
 
-@njit(nogil=True, error_model="numpy", boundscheck=False)
+@njit(inline="always")
 def reset_due(band: Views, live: Places, groups: int, law: SpikeLaw, keep: bool) -> int:
     """Reset the pixels that are due.
 
@@ -154,11 +154,11 @@ def reset_one(band: Views, j: int, taken: float, stands: float, law: SpikeLaw) -
     over, electrons = on_grid(x[HELD + j] - taken), stands * (1.0 / ONE)
     if not (root == 0.0 and rate == 0.0 and kept == 1.0):
         over, electrons = after_reset(over, x[ARRIVES + j] / ONE, stands, root, rate, kept)
-    draws[DRAW + j] = drawn(words[FIRST + j], words[SECOND + j], words[FIRED + j], law.polynomial)
-    words[FIRED + j] = _U(words[FIRED + j] + _U(1))
-    x[ELECTRONS + j], x[HELD + j] = electrons, over
-    x[PHI + j] = next_threshold(electrons, x[NOISE + j], x[JITTER + j], draws[DRAW + j])
-    x[LIMIT + j] = limit_of(x[PHI + j], x[FACTOR + j], x[MOVED + j], x[LOAD + j])
+    draw = drawn(words[FIRST + j], words[SECOND + j], words[FIRED + j], law.polynomial)
+    phi = next_threshold(electrons, x[NOISE + j], x[JITTER + j], draw)
+    words[FIRED + j], draws[DRAW + j] = _U(words[FIRED + j] + _U(1)), draw
+    x[ELECTRONS + j], x[HELD + j], x[PHI + j] = electrons, over, phi
+    x[LIMIT + j] = limit_of(phi, x[FACTOR + j], x[MOVED + j], x[LOAD + j])
 
 
 @njit(inline="always")
