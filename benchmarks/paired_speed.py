@@ -48,11 +48,14 @@ model = SensorModel.preset(preset)
 for name in effects:
     model = model.with_effect(CATALOGUE[name]())
 sensor = SpikeSensor(model, (rows, columns), 0, engine="fast", threads=1)
+
 every = {"moving": 16, "new": 1}.get(kind, frames)
 keys = np.arange(0.0, frames + every, every)
 pictures = np.random.default_rng(0).uniform(0.5, 1.5, (8, rows, columns)) * level
 pictures = pictures.astype(np.float32)
+
 light = pictures[0] if kind == "" else Keyframes(keys, pictures[np.arange(len(keys)) % 8])
+
 start, out = sensor.state(), np.empty((frames, rows, columns), np.uint8)
 
 def run():

@@ -2,8 +2,8 @@
 
     minimise  mean w [ sum_k e_k^2  +  STEADY sum_k (e_k - e_k-1)^2  +  SEAMS (e_0 - e_before)^2 ]
 
-over the shares a_k; e_k is the error of plane k and a_k times the jump (`jump_between`), e_before that of the last
-plane of the pass before, w = 1 / (rate + OFFSET) as in training.  The sum is a square in the shares: one linear system.
+over the shares a_k.  e_k is the error of plane k and a_k times the jump (`jump_between`); e_before is that of the last
+plane of the pass before; w = 1 / (rate + OFFSET) as in training.  The sum is a square in the shares: one linear system.
 
     python -m tools.fit_ease
 """

@@ -1,7 +1,9 @@
 """Passes eased into one another: the first planes of a pass lean on the last planes of the pass before.
 
     jump     = last + (last - last but one + second - first) / 2 - first         carried on in a straight line
+
     motion^2 = ((last - last but one)^2 + (second - first)^2) / 2                of one frame
+
     plane k += EASE[k] jump / (1 + motion^2 / (STILL (first + OFFSET)))          k = 0, 1, ...; cut to [0, 1]
 
 Both passes know the frame at their seam about equally well, and err each in its own way.  So half of the jump between

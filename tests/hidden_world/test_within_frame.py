@@ -232,8 +232,7 @@ def test_few_electrons_come_one_by_one():
 
 @pytest.mark.parametrize("electrons", [150.0, 5e4])
 def test_kicks_add_to_the_rate_whatever_the_electrons(electrons):
-    """x / (1 - k n), n = 4 * 11 / 12 neighbours, less the part of a kick beyond the threshold where it makes a pixel
-    fire, half of it: a reset takes all."""
+    """x / (1 - k n), n = 4 * 11 / 12 neighbours; less half a kick where it makes a pixel fire: a reset takes all."""
     camera = plain_camera((12, 12), electrons=electrons)
     rate = filmed(camera, 0.22, 4000, [hidden("crosstalk", kick=0.02)]).mean()
     kicks = 4 * 11 / 12
