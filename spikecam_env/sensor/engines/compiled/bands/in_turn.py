@@ -32,17 +32,26 @@ from spikecam_env.sensor.engines.compiled.bands.rows import (
     SCRATCH,
     STANDS,
     Bytes,
+    Words,
     limit_of,
-    views,
 )
 from spikecam_env.sensor.engines.compiled.bands.within_frame import between, next_crossing, nodes_of, stands_at
 from spikecam_env.sensor.ground.crossing import NEVER
 from spikecam_env.sensor.ground.intrinsics import borrowed
-from spikecam_env.types import Floats
+from spikecam_env.types import Floats, Pictures
 
 Links = NDArray[np.int32]
 Heap = list[tuple[float, int]]
 """Moments and pixels of one slot."""
+
+
+class Rooms(NamedTuple):
+    """The scratch of all bands by the size of its rows: to make these views takes as long as a spike."""
+
+    x: Floats
+    words: Words
+    draws: Pictures
+    small: Bytes
 
 
 class Turns(NamedTuple):
@@ -101,6 +110,7 @@ def fire_in_turn(scratch: Floats, bits: Bytes, lines: Lines, turns: Turns, sway:
     numbers, links = turns
     rows, columns, pixels = sway.loads.size, sway.columns, bits.size
     still = stands_still(sway)
+    rooms = Rooms(scratch, scratch.view(np.uint32), scratch.view(np.float32), scratch.view(np.uint8))
     slots = begin_turns(scratch, bits, lines, turns, sway, still)
     heap = [(0.0, 0) for _ in range(0)]
     now = 0
@@ -117,7 +127,7 @@ def fire_in_turn(scratch: Floats, bits: Bytes, lines: Lines, turns: Turns, sway:
             p = take_turn(pixels + now, turns, heap)
             u = numbers[p, _MOMENT]
         bits[p], numbers[p, _LAST] = 1, u
-        moment, taken = fire_at(scratch, turns, p, u, sway, still, law)
+        moment, taken = fire_at(rooms, turns, p, u, sway, still, law)
         numbers[p, _MOMENT] = moment
         if moment != NEVER:
             numbers[p, _TAKEN] = taken
@@ -146,9 +156,9 @@ def begin_turns(scratch: Floats, bits: Bytes, lines: Lines, turns: Turns, sway: 
     come = np.empty(bits.size, np.int32)
     came = 0
     for line in range(lines.pixel.size):
-        at = 8 * lines.band[line] * SCRATCH + HIT + lines.slot[line]
+        p0, at = lines.pixel[line], 8 * lines.band[line] * SCRATCH + HIT + lines.slot[line]
         for i in range(lines.width[line]):
-            come[came] = lines.pixel[line] + i
+            come[came] = p0 + i
             came += hits[at + i]
             hits[at + i] = 0
     slots = min(SLOTS * (came + 1), len(links) - bits.size)
@@ -185,19 +195,18 @@ def wait_or_push(p: int, moment: float, slots: int, now: int, turns: Turns, pixe
 
 @njit(inline="always")
 def fire_at(
-    scratch: Floats, turns: Turns, p: int, u: float, sway: FrameSway, still: bool, law: SpikeLaw
+    rooms: Rooms, turns: Turns, p: int, u: float, sway: FrameSway, still: bool, law: SpikeLaw
 ) -> tuple[float, float]:
     """Let pixel p fire at moment u; returns when it does next in this frame, and the charge taken then."""
     band, j = band_and_place(turns.links[p, _PLACE])
-    rows = views(scratch[band])
-    x = rows.x
-    rows.hit[j] = 1
+    x = rooms.x[band]
+    rooms.small[band, HIT + j] = 1
     stands = x[STANDS + j]
     if not still:
         row = p // sway.columns
         at, factor, common = nodes_of(sway, row)
         stands = stands_at(u, at, factor, common, (sway.field[p], sway.grains_per_mV[p], sway.loads[row]))
-    reset_one(rows, j, turns.numbers[p, _TAKEN], stands, law)
+    reset_one(x, rooms.words[band], rooms.draws[band], j, turns.numbers[p, _TAKEN], stands, law)
     if x[HELD + j] >= x[LIMIT + j]:
         return crossing_of(x, j, u, p, sway, still)
     return NEVER, 0.0

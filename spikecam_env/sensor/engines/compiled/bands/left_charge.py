@@ -77,13 +77,14 @@ def add_left_charge(band: Views, live: Places, groups: int, number: int, once_mo
 @njit(nogil=True, error_model="numpy", boundscheck=False)
 def cross_again(band: Views, j: int, end: float, law: SpikeLaw) -> None:
     """Reset a pixel that charge left takes to its threshold again, MOST_AGAIN times at most."""
-    x, draws = band.x, band.words.view(np.float32)
+    x, words = band.x, band.words
+    draws = words.view(np.float32)
     left, left_tau = law.feedback.left, law.feedback.left_tau
     rate = x[ARRIVES + j] / ONE
     for _ in range(MOST_AGAIN):
         if x[HELD + j] < x[LIMIT + j]:
             break
-        reset_one(band, j, x[LIMIT + j], x[STANDS + j], law)
+        reset_one(x, words, draws, j, x[LIMIT + j], x[STANDS + j], law)
         over = x[HELD + j] / ONE
         crossed = end - min(max(over / max(rate, LEAST_RATE), 0.0), 1.0)
         stays = left * (decay(min(max(crossed - x[CROSSED + j], 0.0) / left_tau, LONG)) - 1.0)

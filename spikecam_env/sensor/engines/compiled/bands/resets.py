@@ -146,10 +146,9 @@ def reset_group(x: Floats, words: Words, draws: Pictures, q: int, feedback: Feed
 
 
 @njit(inline="always")
-def reset_one(band: Views, j: int, taken: float, stands: float, law: SpikeLaw) -> None:
+def reset_one(x: Floats, words: Words, draws: Pictures, j: int, taken: float, stands: float, law: SpikeLaw) -> None:
     """Reset one pixel of charge `taken` [grains], with its reference at such a level; as `reset_due`."""
-    x, words, feedback = band.x, band.words, law.feedback
-    draws = words.view(np.float32)
+    feedback = law.feedback
     root, rate, kept = feedback.lost_per_root_rate, feedback.lost_per_rate, feedback.kept
     over, electrons = on_grid(x[HELD + j] - taken), stands * (1.0 / ONE)
     if not (root == 0.0 and rate == 0.0 and kept == 1.0):
