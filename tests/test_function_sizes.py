@@ -11,7 +11,9 @@ from tools import function_sizes
 LONG = "class A:\n    def f(self):\n        '''One\n        two.'''\n" + "        x = 1\n" * function_sizes.LINES
 
 
-def test_a_long_method_is_found_and_its_docstring_is_not_counted(tmp_path: Path, capsys) -> None:
+def test_a_long_method_is_found_and_its_docstring_is_not_counted(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     (tmp_path / "long.py").write_text(LONG)
     assert list(function_sizes.sizes(LONG)) == [(2, "f", function_sizes.LINES + 1)]
     assert function_sizes.main([str(tmp_path)]) == 1

@@ -25,6 +25,7 @@ from spikecam_env.sensor import CATALOGUE, Keyframes, SensorModel, SpikeSensor, 
 from spikecam_env.sensor.effects.base import Effect
 from spikecam_env.sensor.model import PRESETS
 from spikecam_env.types import Pictures
+from spikecam_env.whole import write_text_whole
 
 FRAMES = 72
 """Of a case: more than one step of the fast engine (64)."""
@@ -149,11 +150,13 @@ def main() -> None:
     parser.add_argument("file", type=Path)
     parser.add_argument("--compare", action="store_true", help="with the hashes of FILE; fails where any differs")
     given = parser.parse_args()
+    if given.compare and not given.file.is_file():
+        parser.error(f"there is no file {given.file}; write it by the code before, without --compare")
+    before = json.loads(given.file.read_text(encoding="utf-8")) if given.compare else {}
     now = hashes()
     if not given.compare:
-        given.file.write_text(json.dumps(now, indent=1) + "\n", encoding="utf-8")
+        write_text_whole(given.file, json.dumps(now, indent=1) + "\n")
         return
-    before = json.loads(given.file.read_text(encoding="utf-8"))
     other = [name for name in before if now.get(name) != before[name]]
     print(f"{len(before)} cases, {len(other)} with other spikes")
     if other:
