@@ -25,6 +25,7 @@ from scenes.mujoco.importing import import_mujoco
 from scenes.renderers import contexts
 from scenes.renderers.choose import chosen
 from scenes.renderers.contexts import FIX
+from scenes.renderers.egl import LostContextError
 from spikecam_env.checked import checked_count, checked_shape
 from spikecam_env.errors import InputError, NotReadyError, shown, unknown_name
 from spikecam_env.types import Pictures
@@ -37,6 +38,10 @@ MOST_SAMPLES = 8
 MOST_GEOMS = 10_000
 """Things of a picture at most, as MuJoCo's own `Renderer` has it."""
 KINDS = ("egl-hardware", "egl-software", "osmesa")
+
+_lost: list[Any] = []
+"""MuJoCo's contexts whose context of OpenGL has ended.  They are kept: one that is deleted deletes textures and buffers
+by their numbers, which in the context that is then current are others."""
 
 _SPAWN = "start processes with multiprocessing.get_context('spawn'), or draw in the children alone"
 
@@ -163,8 +168,7 @@ class MujocoPictures:
         mujoco = import_mujoco()
         checked_data(self.model, data)
         with self._one_draws:
-            drawing = self._started()
-            drawing.opengl.make_current()
+            drawing = self._current()
             try:
                 mujoco.mjv_updateScene(
                     self.model, data, self._options, None, self.camera, mujoco.mjtCatBit.mjCAT_ALL, self._scene
@@ -175,6 +179,18 @@ class MujocoPictures:
                 yield drawing
             finally:
                 drawing.opengl.release()
+
+    def _current(self) -> _Drawing:
+        """The drawing with its context made current; a new one where the context was lost."""
+        drawing = self._started()
+        try:
+            drawing.opengl.make_current()
+        except LostContextError:
+            drawing.end()
+            self._drawing = None
+            drawing = self._started()
+            drawing.opengl.make_current()
+        return drawing
 
     def _started(self) -> _Drawing:
         if self._closed:
@@ -238,7 +254,11 @@ class _Ending:
     def __call__(self) -> None:
         if self.process != os.getpid():
             return
-        self.opengl.make_current()
+        try:
+            self.opengl.make_current()
+        except LostContextError:
+            _lost.append(self.context)
+            return
         self.context.free()
         self.opengl.release()
         self.opengl.end()

@@ -31,7 +31,21 @@ _EXTENSIONS = 0x3055
 _SOFTWARE = b"EGL_MESA_device_software"
 _MOST_DEVICES = 64
 
+_LOST = (0x3001, 0x3006, 0x3008, 0x300E)
+"""EGL_NOT_INITIALIZED, _BAD_CONTEXT, _BAD_DISPLAY, _CONTEXT_LOST: errors of a context that worked before."""
+
 _Pointer = ctypes.c_void_p
+
+
+class LostContextError(RuntimeError):
+    """The context has ended: another library ended the display, which a process has once, or the driver stopped.
+
+    SDL ends it as pygame closes a window that it drew off screen, pyrender with each of its renderers.
+
+    Example:
+        >>> issubclass(LostContextError, RuntimeError)
+        True
+    """
 
 
 @dataclass(frozen=True)
@@ -73,10 +87,18 @@ class EglContext:
         return cls(library, display, handle)
 
     def make_current(self) -> None:
-        """Make it this thread's; RuntimeError where another thread has it."""
+        """Make it this thread's.
+
+        Raises:
+            LostContextError: it has ended; start another.
+            RuntimeError: another thread has it.
+        """
         self.library.eglBindAPI(_OPENGL_API)  # which every thread begins without
         if not self.library.eglMakeCurrent(self.display, None, None, self.handle):
-            raise RuntimeError(f"EGL does not give the context to this thread (error {self.library.eglGetError():#x})")
+            error = self.library.eglGetError()
+            if error in _LOST:
+                raise LostContextError(f"EGL has ended the context (error {error:#x})")
+            raise RuntimeError(f"EGL does not give the context to this thread (error {error:#x})")
 
     def release(self) -> None:
         """Leave it to other threads."""

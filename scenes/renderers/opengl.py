@@ -11,6 +11,7 @@ import ctypes
 import os
 import threading
 from collections.abc import Callable, Iterator
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -19,6 +20,7 @@ from weakref import WeakKeyDictionary, finalize
 import numpy as np
 
 from scenes.renderers import contexts
+from scenes.renderers.egl import LostContextError
 from scenes.renderers.protocol import Lighting, PictureWindow, Pinhole, Sprite, Surface
 from scenes.renderers.pyramid import SHARPER, Pyramid
 from scenes.renderers.view import (
@@ -55,11 +57,16 @@ class OpenGL:
     """
 
     def __init__(self, kind: str) -> None:
-        self._context = contexts.start(kind)
+        self._kind, self._home = kind, _here()
+        self._start()
+
+    def _start(self) -> None:
+        """Start OpenGL with nothing in its memory."""
+        kind, self._context = self._kind, contexts.start(self._kind)
         from OpenGL import GL
         from pyrender.shader_program import ShaderProgram
 
-        self._gl, self._home = GL, _here()
+        self._gl = GL
         library = "OSMesa" if kind == "osmesa" else "EGL"
         self.name = f"{library} ({GL.glGetString(GL.GL_RENDERER).decode()})"
         self._surface_program, self._mean_program = (
@@ -109,7 +116,7 @@ class OpenGL:
             self._end()
 
     def _enter(self) -> None:
-        """Make the context current, and release the memory of surfaces that are gone."""
+        """Make the context current, a new one where it was lost, and release the memory of surfaces that are gone."""
         if not self._end.alive:
             raise NotReadyError("this renderer is closed; make a new one with choose_renderer()")
         if self._home != _here():
@@ -117,7 +124,11 @@ class OpenGL:
                 "this renderer was made in another thread, or before the process was forked, and OpenGL does not "
                 "follow; make one in each, and start processes with multiprocessing.get_context('spawn')"
             )
-        self._context.make_current()
+        try:
+            self._context.make_current()
+        except LostContextError:
+            self._end.detach()
+            self._start()
         while self._forgotten:
             self._forgotten.pop().delete()
 
@@ -272,8 +283,9 @@ def _here() -> tuple[int, int]:
 def _end(context: contexts.Context, home: tuple[int, int]) -> None:
     """Give the context back with all that is in it, where that can be done: in its own process and thread."""
     if home == _here():
-        context.make_current()
-        context.end()
+        with suppress(LostContextError):
+            context.make_current()
+            context.end()
 
 
 @njit(nogil=True, cache=True)
