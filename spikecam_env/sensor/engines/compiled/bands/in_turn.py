@@ -106,17 +106,19 @@ def fire_in_turn(scratch: Floats, bits: Bytes, lines: Lines, turns: Turns, sway:
         sway: how references move in the frame.
         law: its kick in grains.
     """
-    turns = borrowed(turns)
+    scratch, turns, sway = borrowed(scratch), borrowed(turns), borrowed(sway)
     numbers, links = turns
     rows, columns, pixels = sway.loads.size, sway.columns, bits.size
     still = stands_still(sway)
-    rooms = Rooms(scratch, scratch.view(np.uint32), scratch.view(np.float32), scratch.view(np.uint8))
+    x = borrowed(scratch.reshape(-1))
+    rooms = borrowed(Rooms(scratch, scratch.view(np.uint32), scratch.view(np.float32), scratch.view(np.uint8)))
     slots = begin_turns(scratch, bits, lines, turns, sway, still)
     heap = [(0.0, 0) for _ in range(0)]
-    now = 0
+    now = crowd = 0  # crowd: its length, as to look at a list counts its uses, by locked instructions
     while True:
-        if len(heap) > 0:
+        if crowd > 0:
             u, p = heappop(heap)
+            crowd -= 1
             if u != numbers[p, _MOMENT]:
                 continue
         else:
@@ -124,14 +126,21 @@ def fire_in_turn(scratch: Floats, bits: Bytes, lines: Lines, turns: Turns, sway:
                 now += 1
             if now == slots:
                 break
-            p = take_turn(pixels + now, turns, heap)
+            p, others = first_of_ring(pixels + now, numbers, links)
+            leave(p, links)
             u = numbers[p, _MOMENT]
+            if others > FEW_WAIT:
+                crowd = all_to_heap(pixels + now, turns, heap)
         bits[p], numbers[p, _LAST] = 1, u
         moment, taken = fire_at(rooms, turns, p, u, sway, still, law)
         numbers[p, _MOMENT] = moment
         if moment != NEVER:
             numbers[p, _TAKEN] = taken
-            wait_or_push(p, moment, slots, now, turns, pixels, heap)
+            slot = slot_of(moment, slots)
+            if crowd > 0 and slot <= now:
+                crowd = push(heap, moment, p)
+            else:
+                wait(p, max(slot, now), links, pixels)
         row = p // columns
         column = p - row * columns
         for side in range(4):
@@ -139,12 +148,16 @@ def fire_in_turn(scratch: Floats, bits: Bytes, lines: Lines, turns: Turns, sway:
             if row + down < 0 or row + down >= rows or column + right < 0 or column + right >= columns:
                 continue
             q = p + down * columns + right
-            kicked, moment, taken = kick_at(scratch, turns, q, u, bits, sway, still, law)
-            if kicked:
+            kicked, moment, taken = kick_at(x, turns, q, u, bits, sway, still, law)
+            if kicked and (moment != NEVER or numbers[q, _MOMENT] != NEVER):
                 leave(q, links)
                 numbers[q, _MOMENT], numbers[q, _TAKEN] = moment, taken
                 if moment != NEVER:
-                    wait_or_push(q, moment, slots, now, turns, pixels, heap)
+                    slot = slot_of(moment, slots)
+                    if crowd > 0 and slot <= now:
+                        crowd = push(heap, moment, q)
+                    else:
+                        wait(q, max(slot, now), links, pixels)
 
 
 @njit(inline="always")
@@ -170,27 +183,22 @@ def begin_turns(scratch: Floats, bits: Bytes, lines: Lines, turns: Turns, sway: 
     return slots
 
 
-@njit(inline="always")
-def take_turn(head: int, turns: Turns, heap: Heap) -> int:
-    """The first pixel of a slot that is not empty leaves it; where many wait there, the others go to the heap."""
+@njit(nogil=True, error_model="numpy", boundscheck=False)
+def all_to_heap(head: int, turns: Turns, heap: Heap) -> int:
+    """Move all pixels of a slot to the heap; returns its length."""
     numbers, links = turns
-    p, others = first_of_ring(head, numbers, links)
-    leave(p, links)
-    while others > FEW_WAIT and links[head, _AFTER] != head:
+    while links[head, _AFTER] != head:
         q = np.int64(links[head, _AFTER])
         leave(q, links)
         heappush(heap, (numbers[q, _MOMENT], q))
-    return p
+    return len(heap)
 
 
-@njit(inline="always")
-def wait_or_push(p: int, moment: float, slots: int, now: int, turns: Turns, pixels: int, heap: Heap) -> None:
-    """Let a pixel wait for a moment: in its slot, or in the heap where that has the slot's."""
-    slot = slot_of(moment, slots)
-    if len(heap) > 0 and slot <= now:
-        heappush(heap, (moment, p))
-    else:
-        wait(p, max(slot, now), turns.links, pixels)
+@njit(nogil=True, error_model="numpy", boundscheck=False)
+def push(heap: Heap, moment: float, p: int) -> int:
+    """Let a pixel wait for a moment in the heap; returns its length."""
+    heappush(heap, (moment, p))
+    return len(heap)
 
 
 @njit(inline="always")
@@ -203,9 +211,7 @@ def fire_at(
     rooms.small[band, HIT + j] = 1
     stands = x[STANDS + j]
     if not still:
-        row = p // sway.columns
-        at, factor, common = nodes_of(sway, row)
-        stands = stands_at(u, at, factor, common, (sway.field[p], sway.grains_per_mV[p], sway.loads[row]))
+        stands = stands_in_sway(u, p, sway)
     reset_one(x, rooms.words[band], rooms.draws[band], j, turns.numbers[p, _TAKEN], stands, law)
     if x[HELD + j] >= x[LIMIT + j]:
         return crossing_of(x, j, u, p, sway, still)
@@ -214,15 +220,14 @@ def fire_at(
 
 @njit(inline="always")
 def kick_at(
-    scratch: Floats, turns: Turns, q: int, u: float, bits: Bytes, sway: FrameSway, still: bool, law: SpikeLaw
+    x: Floats, turns: Turns, q: int, u: float, bits: Bytes, sway: FrameSway, still: bool, law: SpikeLaw
 ) -> tuple[bool, float, float]:
     """Kick pixel q at moment u.
 
     Returns:
         Whether it is kicked: not where it would fire twice at one moment; when it fires then, and the charge taken.
     """
-    band, j = band_and_place(turns.links[q, _PLACE])
-    x = scratch[band]
+    j = np.int64(turns.links[q, _PLACE])
     held, phi, limit = x[HELD + j], x[PHI + j], x[LIMIT + j]
     kick_pixel(x, j, law.feedback.kick_at_once, turns.numbers[q, _SHARE])
     moment, taken = NEVER, 0.0
@@ -249,10 +254,26 @@ def crossing_of(x: Floats, j: int, since: float, p: int, sway: FrameSway, still:
     if still:
         gained, limit = x[ARRIVES + j], x[LIMIT + j]
         return between(x[HELD + j] - gained, gained, since, 0.0, 1.0, limit, limit)
+    return crossing_in_sway(x, j, since, p, sway)
+
+
+@njit(nogil=True, error_model="numpy", boundscheck=False)
+def crossing_in_sway(x: Floats, j: int, since: float, p: int, sway: FrameSway) -> tuple[float, float]:
+    """As `crossing_of`, where references move."""
+    sway = borrowed(sway)
     row = p // sway.columns
     at, factor, common = nodes_of(sway, row)
     of_pixel = sway.field[p], sway.grains_per_mV[p], sway.loads[row]
     return next_crossing(x, j, since, at, factor, common, of_pixel)
+
+
+@njit(nogil=True, error_model="numpy", boundscheck=False)
+def stands_in_sway(u: float, p: int, sway: FrameSway) -> float:
+    """Level of pixel p's reference at moment u, where references move."""
+    sway = borrowed(sway)
+    row = p // sway.columns
+    at, factor, common = nodes_of(sway, row)
+    return stands_at(u, at, factor, common, (sway.field[p], sway.grains_per_mV[p], sway.loads[row]))
 
 
 @njit(inline="always")
