@@ -62,12 +62,12 @@ class OpenGL:
 
     def _start(self) -> None:
         """Start OpenGL with nothing in its memory."""
-        kind, self._context = self._kind, contexts.start(self._kind)
+        self._context = contexts.start(self._kind)
         from OpenGL import GL
         from pyrender.shader_program import ShaderProgram
 
         self._gl = GL
-        library = "OSMesa" if kind == "osmesa" else "EGL"
+        library = "OSMesa" if self._kind == "osmesa" else "EGL"
         self.name = f"{library} ({GL.glGetString(GL.GL_RENDERER).decode()})"
         self._surface_program, self._mean_program = (
             ShaderProgram(str(SHADERS / f"{name}.vert"), str(SHADERS / f"{name}.frag")) for name in ("surface", "mean")
