@@ -182,6 +182,6 @@ def _fit(steps: NDArray[np.int64], square: Floats, terms: Floats, interval: Floa
             rest = back / (1.0 - back)
             white, last = max(white + rest * step, _LEAST), np.inf
             b += rest * change[1] if slow else 0.0
-    sd = np.sqrt(np.diag(inverse @ (scores @ scores.T) @ inverse.T))
+    sd = np.sqrt(((inverse @ scores) ** 2).sum(axis=1))
     share = (weight * shapes[0] * shapes[0] * terms).sum(axis=(0, 2))
     return _Fit(white, float(sd[0]), b, float(sd[1]) if slow else 0.0, share / share.sum())
