@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field, replace
+from functools import partial
 
 import numpy as np
 
@@ -16,6 +17,7 @@ from spikecam_env.gap.statistics.film import FilmFeatures, films
 from spikecam_env.gap.statistics.reading import CampaignReading
 from spikecam_env.gap.twins.budget import Budget
 from spikecam_env.gap.twins.fresh_units import drawn_banks
+from spikecam_env.gap.twins.recent import RecentTwins, Same, fingerprint
 from spikecam_env.gap.twins.simulate import FIRST_SEED
 from spikecam_env.gap.twins.unknown_scene import simulate_seen
 from spikecam_env.gap.unit.refit import BaseFit, free_refit
@@ -40,6 +42,8 @@ class Case:
     frame_rate_hz: float = 40_000.0
     budget: Budget = field(default_factory=Budget, compare=False)
     """Recordings simulated for it, and for all cases that were made of it."""
+    recent: RecentTwins = field(default_factory=RecentTwins, compare=False)
+    """Its last simulated campaigns."""
     nominal_per_label: float = 1.0
     """Nominal radiance of 1 of the labels, by which the light of `conditions` was multiplied."""
     settings: DiagnosisSettings = field(default_factory=DiagnosisSettings)
@@ -126,17 +130,21 @@ def twins(
             though beside an effect that bends rates a refit differs from the unit.
     """
     stands = refits or {}
+    which = tuple(range(len(case.conditions)) if only is None else only)
 
     def made(n: int) -> Twin:
-        return _twin(case, model, base, case.seed * 1000 + FIRST_SEED + n, only, stands.get(n) or base)
+        refit, seed = stands.get(n) or base, case.seed * 1000 + FIRST_SEED + n
+        units = (fingerprint(unit) for unit in (base, refit))
+        key = (model, *units, seed, which, Same(case.conditions), Same(case.observations))
+        make = partial(_twin, case, model, base, seed, which, refit)
+        twin: Twin = case.recent.made(key, make, partial(case.budget.spend, len(which)))
+        return twin
 
     with ThreadPoolExecutor(case.jobs) as pool:
         return list(pool.map(made, numbers))
 
 
-def _twin(case: Case, model: SensorModel, base: BaseFit, seed: int, only: Sequence[int] | None, refit: BaseFit) -> Twin:
-    which = range(len(case.conditions)) if only is None else only
-    case.budget.spend(len(which))
+def _twin(case: Case, model: SensorModel, base: BaseFit, seed: int, which: Sequence[int], refit: BaseFit) -> Twin:
     conditions = [case.conditions[i] for i in which]
     seen = [case.observations[i] for i in which]
     observations = simulate_seen(model, base, conditions, seen, case.shape, seed, which, case.jobs)
