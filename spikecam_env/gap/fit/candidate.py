@@ -27,13 +27,13 @@ from spikecam_env.gap.fit.gauss_newton import (
     SMALL_STEP,
     UNITS_OF_A_STEP,
     Descent,
-    Free,
     descend,
     probe_of,
     spreads_of,
 )
 from spikecam_env.gap.fit.hypothesis import Fit
-from spikecam_env.gap.fit.problem import OF_RANDOM_COURSE, Problem, twins_of
+from spikecam_env.gap.fit.problem import OF_EVENTS, OF_RANDOM_COURSE, Problem, twins_of
+from spikecam_env.gap.fit.slopes import Free
 from spikecam_env.gap.unit.indirect_inference import extrapolated_unit, has_converged
 from spikecam_env.gap.unit.refit import BaseFit, constrained_refit
 from spikecam_env.types import Floats
@@ -118,7 +118,8 @@ class _Rescaling:
 def _fit_twins(problem: Problem, name: str, parameters: dict[str, float], expected: Floats | None, white: float) -> Fit:
     """Simulate, raise the strength until it shows, then rescale until it changes by less than a third.
 
-    The unit is refitted under every trial.  A trial is repeated once where the unit settles far from its start.
+    The unit is refitted under every trial.  A trial is repeated once where the unit settles far from its start.  One
+    twin shows whether it does, and whether the effect does.
     The last step scales the last prediction, without another twin.
     """
     effect, null = candidate(name), problem.null
@@ -136,7 +137,7 @@ def _fit_twins(problem: Problem, name: str, parameters: dict[str, float], expect
     for turn in range(MOST_TRIES):
         is_last = turn == MOST_TRIES - 1
         model = with_effect(problem.model, name, trial.parameters)
-        predicted = problem.predict(model, trial.base, twins_of(name), trial.only)
+        predicted = problem.predict(model, trial.base, 1, trial.only)
         size = effect_size(null, problem.seen, predicted.mean - null.mean)
         stronger = trial.parameters if is_last else until_visible(name, trial.parameters, size)
         if stronger != trial.parameters:
@@ -148,6 +149,8 @@ def _fit_twins(problem: Problem, name: str, parameters: dict[str, float], expect
         if not repeated and not is_last and not has_converged(assumed, trial.base):
             repeated = True
             continue
+        if twins_of(name) > 1:
+            predicted = problem.predict(model, assumed, twins_of(name), trial.only)
         way = _rescaling(problem, name, trial, predicted, least, way)
         if way.is_useless or is_last or (way.is_near and turn):
             break
@@ -255,14 +258,18 @@ def _fit_random_course(problem: Problem, name: str, parameters: dict[str, float]
     """
     strength, power = candidate(name).strength, candidate(name).power
     only = problem.affected([name])
-    for _ in range(2):
+
+    def tried(count: int) -> tuple[BaseFit, Prediction]:
         model = with_effect(problem.model, name, bounded(name, parameters))
         base = constrained_refit(model, problem.case.base)
-        predicted = problem.predict(model, base, OF_RANDOM_COURSE, only)
-        factor, sd = likeliest(problem.null, problem.seen, predicted)
+        return base, problem.predict(model, base, count, only)
+
+    factor, _ = likeliest(problem.null, problem.seen, tried(OF_EVENTS)[1])
+    if not 1 / LARGEST_FACTOR < factor < LARGEST_FACTOR:
         parameters = bounded(name, {**parameters, strength: parameters[strength] * factor ** (1 / power)})
-        if 1 / LARGEST_FACTOR < factor < LARGEST_FACTOR:
-            break
+    base, predicted = tried(OF_RANDOM_COURSE)
+    factor, sd = likeliest(problem.null, problem.seen, predicted)
+    parameters = bounded(name, {**parameters, strength: parameters[strength] * factor ** (1 / power)})
     predicted = with_change_scaled(problem.null, predicted, factor)
     sds = {strength: parameters[strength] * max(sd, np.sqrt(2.0 / len(only))) / power}
     return problem.fit_of(name, parameters, with_effect(problem.model, name, parameters), base, predicted, sds)

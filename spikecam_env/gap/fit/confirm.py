@@ -12,6 +12,8 @@ from spikecam_env.gap.compare.distance import effect_size
 from spikecam_env.gap.compare.prediction import Null, Prediction, with_change_scaled
 from spikecam_env.gap.fit.hypothesis import Fit
 from spikecam_env.gap.fit.problem import OF_RANDOM_COURSE, Problem, twins_of, with_held_out
+from spikecam_env.gap.fit.slopes import Slopes, is_in_proportion
+from spikecam_env.gap.twins.case import refit_recordings
 from spikecam_env.gap.twins.fresh_units import drawn_response
 from spikecam_env.gap.unit.conversion import LINES
 from spikecam_env.gap.unit.indirect_inference import IDENTIFIABLE, extrapolated_unit
@@ -48,6 +50,9 @@ def confirmed(problem: Problem, fitted: Fit, count: int | None = None) -> Fit:
             predicted = replace(predicted, own=predicted.mean - bare.mean)
     if effects.any_pattern:
         predicted = problem.with_pattern(fitted.model, predicted)
+    if len(added) == 1 and is_in_proportion(added[0]) and predicted.own is None:
+        slopes = Slopes.by_proportion(null, problem.seen, added[0], fitted.model, predicted)
+        fitted = replace(fitted, slopes=slopes)
     return with_prediction(problem, fitted, predicted)
 
 
@@ -94,9 +99,10 @@ def with_dark_levels_open(problem: Problem, model: SensorModel, base: BaseFit, p
 
 
 def resettled(problem: Problem, fitted: Fit, model: SensorModel) -> Fit:
-    """The fit with another model, and its unit settled under it."""
+    """The fit with another model, and its unit settled under it, by the recordings that a refit rests on."""
     base = constrained_refit(model, fitted.base)
-    return replace(fitted, model=model, base=problem.settled_unit(model, base, problem.predict(model, base, 1)))
+    made = problem.predict(model, base, 1, sorted(refit_recordings(problem.case)))
+    return replace(fitted, model=model, base=problem.settled_unit(model, base, made))
 
 
 def no_more_certain(problem: Problem, fitted: Fit, known: Prediction) -> Fit:

@@ -20,6 +20,7 @@ from spikecam_env.gap.compare.step import change_of, step_of
 from spikecam_env.gap.fit.coordinates import moved_value
 from spikecam_env.gap.fit.predict import settled_unit
 from spikecam_env.gap.fit.problem import Problem
+from spikecam_env.gap.fit.slopes import NEAR, NO_SLOPES, UNIT, Free, Slopes
 from spikecam_env.gap.twins.fresh_units import SPREAD_PARAMETERS, with_spreads_scaled
 from spikecam_env.gap.unit.indirect_inference import has_converged
 from spikecam_env.gap.unit.refit import BaseFit, constrained_refit
@@ -42,14 +43,8 @@ MOST_STEPS = 4
 SMALL_STEP = 0.05
 """Step of a logarithm that needs no other; two strengths so close show no slope."""
 
-LONG_STEP = 0.5
-"""Step of a logarithm beyond which derivatives are taken anew."""
-
 LONGEST_STEP = 0.7
 """Largest step of a logarithm at once, a factor of two, within what was open of the parameter before."""
-
-UNIT = "the unit"
-"""Its own parameters stand under this name among parameters by effect and name."""
 
 WHITE = (UNIT, "white")
 """The unit's own s^2, where an effect hides it."""
@@ -63,11 +58,18 @@ UNITS_OF_A_STEP = 4
 STRENGTH_STEPS = (0.25, 1.0)
 """Steps of a strength's logarithm to take a derivative by, at least and at most."""
 
-Probe = Callable[[SensorModel, BaseFit], Prediction]
-"""Predicts the statistics of a model and a unit."""
 
-Free = Sequence[tuple[str, str]]
-"""Parameters by effect and name."""
+@dataclass(frozen=True)
+class Probe:
+    """Predicts the statistics of a model and a unit."""
+
+    by: Callable[[SensorModel, BaseFit, int], Prediction]
+    """By a number of twins."""
+    count: int = 1
+    """Number of twins that show them."""
+
+    def __call__(self, model: SensorModel, base: BaseFit) -> Prediction:
+        return self.by(model, base, self.count)
 
 
 @dataclass(frozen=True)
@@ -97,15 +99,21 @@ def probe_of(problem: Problem, names: Sequence[str], only: Sequence[int], count:
     maps = problem.case.rates_only
     draws_units, units = Candidates(tuple(names)).any_pattern or maps, UNITS_OF_A_STEP if maps else None
 
-    def statistics(model: SensorModel, base: BaseFit) -> Prediction:
+    def statistics(model: SensorModel, base: BaseFit, count: int) -> Prediction:
         made = problem.predict(model, constrained_refit(model, base), count, only) if only else problem.null.prediction
         return problem.with_pattern(model, made, units) if draws_units else made
 
-    return statistics
+    return Probe(statistics, count)
 
 
 def descend(
-    problem: Problem, probe: Probe, model: SensorModel, base: BaseFit, free: Free, to_step: float = STOP
+    problem: Problem,
+    probe: Probe,
+    model: SensorModel,
+    base: BaseFit,
+    free: Free,
+    to_step: float = STOP,
+    known: Slopes = NO_SLOPES,
 ) -> Descent:
     """Move the parameters `free` of a model to the least misfit.
 
@@ -118,10 +126,11 @@ def descend(
         free: parameters to move.
         to_step: misfit that a step has to promise, and the step before to have removed; default: that of a chosen
             effect.
+        known: derivatives at the start, which are not taken.
     """
     null = problem.null
     at, base = at_settled_unit(probe, null, model, base, free)
-    columns, noise = derivatives(problem, probe, model, base, at, free)
+    columns, noise = derivatives(problem, probe, model, base, at, free, known)
     before, longest = prior_sd(free), longest_of(free)
     tried = []
     for turn in range(MOST_STEPS):
@@ -134,7 +143,7 @@ def descend(
         if turn == MOST_STEPS - 1 or little or np.all(np.abs(step) < SMALL_STEP):
             break
         after, base = at_settled_unit(probe, null, model, base, free)
-        if np.abs(step).max() < LONG_STEP:
+        if np.abs(step).max() < NEAR:
             own = np.sqrt(own_variance(null, at) + own_variance(null, after))
             columns = broyden(columns, step, after.mean - at.mean, APART * own)
         else:
@@ -183,7 +192,13 @@ def moved(model: SensorModel, base: BaseFit, free: Free, step: Floats) -> tuple[
 
 
 def derivatives(
-    problem: Problem, probe: Probe, model: SensorModel, base: BaseFit, at: Prediction, free: Free
+    problem: Problem,
+    probe: Probe,
+    model: SensorModel,
+    base: BaseFit,
+    at: Prediction,
+    free: Free,
+    known: Slopes = NO_SLOPES,
 ) -> tuple[Floats, Floats]:
     """Derivatives of the statistics by the parameters' logarithms, each under a unit that has settled.
 
@@ -194,10 +209,22 @@ def derivatives(
         probe: predicts the statistics of a model.
         at: the prediction of the model.
         free: the n parameters.
+        known: derivatives by some of them, which are not taken.
 
     Returns:
         ((S, n) derivatives, (S, n) their standard deviations).
     """
+    new = [f for f in free if f not in known.free]
+    if new:
+        known = Slopes(tuple(new), *_taken(problem, probe, model, base, at, new), (np.nan,) * len(new)).beside(known)
+    own = known.of(free)
+    return own.columns, own.noise
+
+
+def _taken(
+    problem: Problem, probe: Probe, model: SensorModel, base: BaseFit, at: Prediction, free: Free
+) -> tuple[Floats, Floats]:
+    """`derivatives` by twins of each parameter a step away."""
     null = problem.null
     peak = float(np.max(np.abs(at.mean - null.mean) / null.noise))
     sizes = np.array([derivative_step(name, key, peak) for name, key in free])
@@ -216,10 +243,12 @@ def derivatives(
 def at_settled_unit(
     probe: Probe, null: Null, model: SensorModel, base: BaseFit, free: Free
 ) -> tuple[Prediction, BaseFit]:
-    """(prediction of a model under a settled unit, that unit), by a second prediction where the first unit moves."""
-    made = probe(model, base)
+    """(prediction of a model under a settled unit, that unit); one twin shows whether the unit moves."""
+    made = probe.by(model, base, 1)
     settled = unit_after(model, base, null, made, free)
-    return (made, base) if has_converged(base, settled) else (probe(model, settled), settled)
+    if not has_converged(base, settled):
+        return probe(model, settled), settled
+    return (made if probe.count == 1 else probe(model, base)), base
 
 
 def unit_after(model: SensorModel, base: BaseFit, null: Null, made: Prediction, free: Free) -> BaseFit:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from spikecam_env.gap.compare.prediction import Prediction
+from spikecam_env.gap.fit.slopes import NO_SLOPES, Slopes
 from spikecam_env.gap.unit.refit import BaseFit
 from spikecam_env.sensor import SensorModel
 from spikecam_env.types import Floats
@@ -43,6 +44,8 @@ class Fit(Hypothesis):
     parameters: dict[str, float]
     sd: dict[str, float]
     """Standard deviations, by parameter."""
+    slopes: Slopes = NO_SLOPES
+    """Derivatives of the statistics that are known."""
 
     def added_to(self, model: SensorModel) -> list[str]:
         """Names of the effects that it adds to a model: its own, then those that are fitted with it."""

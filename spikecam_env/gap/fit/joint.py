@@ -9,14 +9,20 @@ import numpy as np
 
 from spikecam_env.gap.candidates.table import Candidates, candidate
 from spikecam_env.gap.compare.distance import APART
+from spikecam_env.gap.compare.prediction import TOLERANCE
 from spikecam_env.gap.fit.confirm import confirmed
 from spikecam_env.gap.fit.coordinates import is_apart
-from spikecam_env.gap.fit.gauss_newton import WHITE, Probe, descend, probe_of, spreads_of
+from spikecam_env.gap.fit.gauss_newton import SMALL_STEP, WHITE, Descent, Probe, descend, probe_of, spreads_of
 from spikecam_env.gap.fit.hypothesis import Fit, Hypothesis
-from spikecam_env.gap.fit.last_step import Errors, Slopes, last_step
+from spikecam_env.gap.fit.last_step import Errors, last_step, slopes_at
 from spikecam_env.gap.fit.problem import Problem, twins_of, with_held_out
+from spikecam_env.gap.fit.slopes import UNIT, Free, Slopes, are_alike, values_in
+from spikecam_env.gap.unit.indirect_inference import has_converged
 from spikecam_env.gap.unit.refit import BaseFit, constrained_refit
 from spikecam_env.types import Floats
+
+SAME_NOISE = 0.2 * TOLERANCE
+"""Relative change of a unit's s^2 within which twins of one serve for the other: a fifth of the error of laws."""
 
 OWN_SHARE = 0.9
 """Of the refit's s^2: a unit with a smaller share of its own is fitted with the effects."""
@@ -53,7 +59,8 @@ def refined_together(problem: Problem, fitted: Fit, names: Sequence[str]) -> tup
 def _refined(problem: Problem, fitted: Fit, names: Sequence[str]) -> tuple[Fit, Errors, Floats]:
     """(the fit, errors, (S,) variance of the statistics by them), as `last_step` returns them.
 
-    If parameters are not refined (`to_refine`), the derivatives of all are taken anew for the last step.
+    If parameters are not refined (`to_refine`), the derivatives of all are taken anew for the last step.  A descent
+    that stays where the fit is leaves it there, so that its twins serve again: the last step goes the rest of the way.
     """
     settings, probe = problem.settings, _probe(problem, fitted, names)
     free = to_refine(problem, fitted, names)
@@ -61,14 +68,16 @@ def _refined(problem: Problem, fitted: Fit, names: Sequence[str]) -> tuple[Fit, 
     free += of_unit(problem, fitted)
     now, base, slopes = fitted.model, fitted.base, None
     if free:
-        end = descend(problem, probe, now, base, free)
-        now, base, slopes = end.model, end.base, Slopes.of_descent(free, end.columns, end.noise)
+        end = descend(problem, probe, now, base, free, known=fitted.slopes.near(now, free))
+        slopes = Slopes.of_descent(end.model, free, end.columns, end.noise)
+        if not stays(fitted, end, free):
+            now, base = end.model, end.base
     best = confirmed(problem, replace(fitted, model=now, base=base), settings.twins.in_the_end)
     if best.misfit > problem.misfit(fitted.prediction) + settings.deviance.by_chance:
         best = fitted
     if held or slopes is None:
-        slopes = Slopes.at(problem, probe, best, free + held)
-    return with_last_step(problem, best, names, slopes)
+        slopes = slopes_at(problem, probe, best, free + held)
+    return with_last_step(problem, replace(best, slopes=slopes), names, slopes)
 
 
 def with_last_step(problem: Problem, fitted: Fit, names: Sequence[str], slopes: Slopes) -> tuple[Fit, Errors, Floats]:
@@ -90,7 +99,7 @@ def stepped_once(problem: Problem, fitted: Fit, names: Sequence[str]) -> tuple[F
     """
     free = fitted_of(problem, names)
     free += of_unit(problem, fitted) if free else []
-    slopes = Slopes.at(problem, _probe(problem, fitted, names), fitted, free)
+    slopes = slopes_at(problem, _probe(problem, fitted, names), fitted, free)
     best, errors, own2 = with_last_step(problem, fitted, names, slopes)
     error = np.sqrt(best.prediction.error**2 + own2 * np.isnan(problem.seen))
     return replace(best, prediction=replace(best.prediction, error=error)), errors
@@ -167,3 +176,11 @@ def agree(before: Fit, after: Fit, errors: Errors, apart: float) -> bool:
 def _probe(problem: Problem, fitted: Fit, names: Sequence[str]) -> Probe:
     """The probe of a fit's effects, on recordings held out as well."""
     return probe_of(problem, names, *simulated_for(problem, fitted, names))
+
+
+def stays(fitted: Fit, end: Descent, free: Free) -> bool:
+    """Whether a descent has ended where the fit is, so that the fit's twins serve for it."""
+    values = zip(free, values_in(fitted.model, free), values_in(end.model, free), strict=True)
+    near = all(are_alike(parameter, one, other, SMALL_STEP) for parameter, one, other in values if parameter[0] != UNIT)
+    white, settled = fitted.base.white, end.base.white
+    return near and has_converged(fitted.base, end.base) and abs(settled - white) <= SAME_NOISE * white

@@ -11,7 +11,7 @@ part of the step that was not taken, and, without a descent, the curvature that 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
@@ -19,8 +19,6 @@ from spikecam_env.gap.candidates.table import candidate
 from spikecam_env.gap.compare.step import step_of
 from spikecam_env.gap.fit.coordinates import error_of
 from spikecam_env.gap.fit.gauss_newton import (
-    UNIT,
-    Free,
     Probe,
     at_settled_unit,
     derivatives,
@@ -30,6 +28,7 @@ from spikecam_env.gap.fit.gauss_newton import (
 )
 from spikecam_env.gap.fit.hypothesis import Fit
 from spikecam_env.gap.fit.problem import Problem
+from spikecam_env.gap.fit.slopes import UNIT, Free, Slopes
 from spikecam_env.types import Floats
 
 MOST_LINEAR_STEPS = 20
@@ -42,33 +41,14 @@ Errors = dict[str, dict[str, float]]
 """Standard deviation of each parameter, by effect and name."""
 
 
-@dataclass(frozen=True)
-class Slopes:
-    """Derivatives of the statistics by parameters' logarithms."""
-
-    free: tuple[tuple[str, str], ...]
-    """The n parameters, by effect and name."""
-    columns: Floats
-    """(S, n) change of each statistic for one more of each logarithm."""
-    noise: Floats
-    """(S, n) standard deviations of `columns`."""
-    once: bool
-    """Whether derivatives were taken once, at the fit, since not all parameters were descended."""
-
-    @classmethod
-    def of_descent(cls, free: Free, columns: Floats, noise: Floats) -> Slopes:
-        """Derivatives at the end of a descent."""
-        return cls(tuple(free), columns, noise, once=False)
-
-    @classmethod
-    def at(cls, problem: Problem, probe: Probe, fitted: Fit, free: Free) -> Slopes:
-        """Derivatives at a fit, by a twin a parameter and one of the fit; none without parameters."""
-        if not free:
-            none = np.zeros((len(problem.seen), 0))
-            return cls((), none, none, once=True)
+def slopes_at(problem: Problem, probe: Probe, fitted: Fit, free: Free) -> Slopes:
+    """Derivatives at a fit: those that it knows, others by a twin a parameter and one of the fit."""
+    known = fitted.slopes.near(fitted.model, free)
+    if len(known.free) < len(free):
         here, base = at_settled_unit(probe, problem.null, fitted.model, fitted.base, free)
-        columns, noise = derivatives(problem, probe, fitted.model, base, here, free)
-        return cls(tuple(free), columns, noise, once=True)
+        columns, noise = derivatives(problem, probe, fitted.model, base, here, free, known)
+        known = Slopes.of_descent(fitted.model, free, columns, noise)
+    return replace(known, once=True)
 
 
 def last_step(problem: Problem, fitted: Fit, names: Sequence[str], slopes: Slopes) -> tuple[Fit, Errors, Floats]:

@@ -9,7 +9,6 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
-from functools import partial
 from itertools import product
 
 import numpy as np
@@ -19,7 +18,7 @@ from spikecam_env.gap.candidates.strength import bounded, with_effect
 from spikecam_env.gap.candidates.table import NOISE_OF_A_RESET, candidate
 from spikecam_env.gap.compare.distance import in_noise
 from spikecam_env.gap.compare.prediction import Null, values_of
-from spikecam_env.gap.fit.gauss_newton import at_settled_unit
+from spikecam_env.gap.fit.gauss_newton import Probe, at_settled_unit
 from spikecam_env.gap.fit.predict import predict_by_twins, with_drawn_pattern
 from spikecam_env.gap.screen.templates import Template, Templates
 from spikecam_env.gap.twins.case import Case, twins
@@ -114,7 +113,7 @@ def simulated_shift(case: Case, model: SensorModel, null: Null, name: str, param
         made = with_drawn_pattern(case, changed, null, null.prediction)
     else:
         made, _ = at_settled_unit(
-            partial(predict_by_twins, case, null=null, count=1),
+            Probe(lambda m, base, count: predict_by_twins(case, m, base, null, count)),
             null,
             changed,
             constrained_refit(changed, case.base),

@@ -22,7 +22,7 @@ from spikecam_env.gap.compare.distance import CLEAR, in_noise
 from spikecam_env.gap.compare.prediction import Null, Prediction, pair_noise_share, pooled
 from spikecam_env.gap.compare.step import is_clear
 from spikecam_env.gap.fit.candidate import MOST_TRIES
-from spikecam_env.gap.fit.gauss_newton import at_settled_unit
+from spikecam_env.gap.fit.gauss_newton import Probe, at_settled_unit
 from spikecam_env.gap.fit.predict import predict_by_twins, with_drawn_pattern
 from spikecam_env.gap.fit.problem import OF_RANDOM_COURSE, recordings_affected, twins_of
 from spikecam_env.gap.twins.case import Case
@@ -174,10 +174,10 @@ class TwinProbe(EffectProbe):
         strong = with_effect(self.model, self.name, parameters)
         bare = constrained_refit(strong, constrained_refit(self.model, self.case.base))
 
-        def probe(model: SensorModel, unit: BaseFit) -> Prediction:
+        def predict(model: SensorModel, unit: BaseFit, count: int) -> Prediction:
             return predict_by_twins(self.case, model, unit, self.null, count, self.only)
 
-        made, unit = at_settled_unit(probe, self.null, strong, bare, [])
+        made, unit = at_settled_unit(Probe(predict, count), self.null, strong, bare, [])
         score = (self._scatter_score if self.random_course else self._change_score)(made, parameters)
         return replace(score, bare=bare, unit=unit) if score else None
 

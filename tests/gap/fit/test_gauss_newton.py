@@ -12,6 +12,7 @@ from spikecam_env.gap.candidates.strength import with_effect
 from spikecam_env.gap.compare.prediction import Draw, Null, Prediction
 from spikecam_env.gap.fit.gauss_newton import Probe, descend
 from spikecam_env.gap.fit.problem import Problem
+from spikecam_env.gap.fit.slopes import Slopes
 from spikecam_env.gap.unit.refit import BaseFit
 from spikecam_env.sensor import SensorModel
 
@@ -31,13 +32,15 @@ def law(fraction: float, tau_us: float) -> np.ndarray:
     return strength * np.where(np.arange(COUNT) < 30, 1.0, (tau_us / TRUE["tau_us"]) ** 0.5)
 
 
-def probe_of(n: Null, change: Callable[..., np.ndarray]) -> Probe:
-    def probe(model: SensorModel, base: BaseFit) -> Prediction:
+def probe_of(n: Null, change: Callable[..., np.ndarray], asked: list[SensorModel] | None = None) -> Probe:
+    def probe(model: SensorModel, base: BaseFit, count: int) -> Prediction:
+        if asked is not None:
+            asked.append(model)
         [effect] = [e for e in model.effects if e.name == NAME]
         values = n.mean + change(**{k: effect.parameters()[k] for k in TRUE})
         return Prediction(values, n.sd / np.sqrt(TWINS), n.sd, (Draw(TWINS - 1, values, None),))
 
-    return probe
+    return Probe(probe)
 
 
 def start(**times: float) -> SensorModel:
@@ -76,3 +79,26 @@ def test_where_steps_come_to_leave_more_the_best_is_kept():
     print(parameters_of(end.model), parameters_of(kept.model))
     assert parameters_of(end.model) == parameters_of(first)
     assert abs(np.log(parameters_of(kept.model)["fraction"] / TRUE["fraction"])) < 0.05
+
+
+def test_known_derivatives_are_not_taken_again():
+    """A second descent begins with those of the first: a twin of its start, and one after each step."""
+    n = made_up_null(COUNT)
+    measured = n.mean + law(**TRUE) + n.sd * np.random.default_rng(1).standard_normal(COUNT)
+    first = descend(problem_of(n, measured), probe_of(n, law), start(fraction=0.8, tau_us=1.2), unit(), FREE)
+    known = Slopes.of_descent(first.model, FREE, first.columns, first.noise)
+    again, anew = [], []
+    begin = start(fraction=1.1, tau_us=0.9)
+    end = descend(problem_of(n, measured), probe_of(n, law, again), begin, unit(), FREE, known=known.near(begin, FREE))
+    descend(problem_of(n, measured), probe_of(n, law, anew), begin, unit(), FREE)
+    assert len(again) == len(anew) - len(FREE)
+    for (_, key), error in zip(FREE, np.sqrt(np.diag(end.covariance)), strict=True):
+        assert abs(np.log(parameters_of(end.model)[key] / parameters_of(first.model)[key])) < error
+
+
+def test_derivatives_far_away_are_not_known_nor_those_of_a_part_of_an_effect():
+    columns = np.ones((COUNT, 2))
+    known = Slopes.of_descent(start(fraction=1.0, tau_us=1.0), FREE, columns, columns)
+    assert known.near(start(fraction=1.2, tau_us=1.2), FREE).free == tuple(FREE)
+    assert not known.near(start(fraction=1.2, tau_us=2.0), FREE).free
+    assert not known.of(FREE[:1]).near(start(fraction=1.0, tau_us=1.0), FREE).free
