@@ -15,6 +15,8 @@ from spikecam_env.gap.search.round import Round
 from spikecam_env.gap.verdict.degree import Explanation, explanation_of
 from spikecam_env.sensor import CATALOGUE
 
+Ahead = dict[str, float]
+
 
 def given(mean: np.ndarray) -> Prediction:
     """A prediction of a mean (S,), of noise 1."""
@@ -22,9 +24,13 @@ def given(mean: np.ndarray) -> Prediction:
 
 
 def explained(
-    null: Null, values: np.ndarray, *changes: np.ndarray, margin: float | tuple[float, ...] = 0.9
+    null: Null, values: np.ndarray, *changes: np.ndarray, margin: float | tuple[float, ...] | tuple[Ahead, ...] = 0.9
 ) -> Explanation:
-    """The explanation of values (S,) by effects that change the statistics one after the other."""
+    """The explanation of values (S,) by effects that change the statistics one after the other.
+
+    Args:
+        margin: of each, or how far it is ahead of each other candidate of its round.
+    """
     margins = margin if isinstance(margin, tuple) else (margin,) * len(changes)
     model, mean, rounds = small.MODEL, np.zeros(len(values)), []
 
@@ -34,6 +40,6 @@ def explained(
         return Round(at, **own)
 
     for name, change, own in zip(("dead_time", "crosstalk"), changes, margins, strict=False):
-        rounds.append(turn(fits=(SimpleNamespace(name=name),), margin=own))
+        rounds.append(turn(fits=(SimpleNamespace(name=name),), ahead=own if isinstance(own, dict) else {"": own}))
         model, mean = model.with_effect(CATALOGUE[name]()), mean + change
     return explanation_of(null, values, [*rounds, turn()])

@@ -154,4 +154,4 @@ def found_alone(
     problem = Problem.of(case, MODEL, null(), values)
     first = problem.hypothesis(MODEL, case.base, null().prediction)
     fit = problem.fit_of("dead_time", {"tau_us": 0.5}, model, base, predicted, {"tau_us": 0.01})
-    return [Round(first, (fit,), margin=margin), Round(problem.hypothesis(model, base, predicted))]
+    return [Round(first, (fit,), ahead={"": margin}), Round(problem.hypothesis(model, base, predicted))]

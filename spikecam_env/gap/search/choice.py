@@ -34,8 +34,8 @@ def confirmed_in_order(
 ) -> tuple[list[Fit], list[Fit]]:
     """Confirm fits, which rest on one twin each, by more twins, from the best on.
 
-    At least two are confirmed.  Confirmation ends at a fit that would be `margin` above the best one, even if it got
-    as much better as any did.
+    At least two are confirmed, not counting those of random course, which rest on many twins already.  Confirmation
+    ends at a fit that would be `margin` above the best one, even if it got as much better as any did.
 
     Args:
         fits: in any order.
@@ -50,29 +50,40 @@ def confirmed_in_order(
     waiting, done, better = sorted(fits, key=lambda f: f.misfit), list(known), 0.0
     while waiting:
         least, hope = min((f.misfit for f in done), default=np.inf), waiting[0].misfit - better
-        if min(least, hope) > enough or (len(done) > 1 and hope >= least + margin):
+        few = [f for f in done if not candidate(f.name).random_course]
+        if min(least, hope) > enough or (len(few) > 1 and hope >= least + margin):
             break
         done.append(confirm(waiting[0]))
         better = max(better, waiting.pop(0).misfit - done[-1].misfit)
     return sorted(done, key=lambda f: f.misfit), waiting
 
 
-def margin_of(model: SensorModel, before: float, fits: Sequence[Fit]) -> float:
-    """Of the misfit that the first fit removes, the share that no other fit removes: 0 to 1.
+NOTHING = ""
+"""Name of no candidate: without one, nothing of the misfit is removed."""
 
-    Fits of the first effect together with another one are no others.
+
+def ahead_of(model: SensorModel, before: float, fits: Sequence[Fit]) -> dict[str, float]:
+    """Of the misfit that the first fit removes, the share that each other fit does not remove: 0 to 1, by name.
+
+    Fits of the first effect together with another one are no others.  A candidate of random course is none to one that
+    is not: it makes a difference likely as scatter, of whatever shape, and does not predict it.
 
     Args:
         model: that the candidates were added to.
         before: its misfit.
-        fits: the chosen fit, then the others in any order; none removes nothing.
+        fits: the chosen fit, then the others in any order.
     """
-    if not fits:
-        return 0.0
+    if not fits or fits[0].misfit >= before:
+        return {}
     best, *rest = fits
-    others = [f.misfit for f in rest if best.name not in f.added_to(model)]
-    second = min([before, *others])
-    return float(max(second - best.misfit, 0.0) / max(before - best.misfit, 1e-9)) if best.misfit < before else 0.0
+    of_course = candidate(best.name).random_course
+    others = [f for f in rest if best.name not in f.added_to(model)]
+    left = {f.name: f.misfit for f in others if of_course or not candidate(f.name).random_course}
+    removed = before - best.misfit
+    return {
+        name: float(np.clip((misfit - best.misfit) / removed, 0.0, 1.0))
+        for name, misfit in {NOTHING: before, **left}.items()
+    }
 
 
 def chosen_of(here: Problem, draws: Sequence[Draw], confirmed: Sequence[Fit]) -> tuple[list[Fit], tuple[str, ...]]:

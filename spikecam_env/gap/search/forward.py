@@ -29,7 +29,7 @@ from spikecam_env.gap.fit.joint import (
 )
 from spikecam_env.gap.fit.problem import Problem
 from spikecam_env.gap.screen.templates import Templates
-from spikecam_env.gap.search.choice import PER_PARAMETER, chosen_of, confirmed_in_order, margin_of
+from spikecam_env.gap.search.choice import PER_PARAMETER, ahead_of, chosen_of, confirmed_in_order
 from spikecam_env.gap.search.joint_start import fit_pairs, one_by_one, with_pairs
 from spikecam_env.gap.search.neighbours import (
     may_try_without_earlier,
@@ -137,8 +137,8 @@ def with_candidates(
         anew = [confirm(f) for f in try_other_starts(here, done[0], turn.start.misfit, screened, tries)]
         done[0] = min((done[0], *anew), key=lambda f: f.misfit)
     done, rivals = chosen_of(here, problem.null.draws, done)
-    margin = margin_of(here.model, turn.start.misfit, [*done, *rest])
-    return replace(turn, fits=(*done, *rest), rivals=rivals, margin=margin)
+    ahead = ahead_of(here.model, turn.start.misfit, [*done, *rest])
+    return replace(turn, fits=(*done, *rest), rivals=rivals, ahead=ahead)
 
 
 def joined(problem: Problem, rounds: Sequence[Round], chance: float) -> list[Round]:

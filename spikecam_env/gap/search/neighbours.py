@@ -28,7 +28,7 @@ from spikecam_env.gap.fit.joint import no_smaller, refined_together
 from spikecam_env.gap.fit.last_step import Errors
 from spikecam_env.gap.fit.problem import Problem
 from spikecam_env.gap.screen.screen import Screened
-from spikecam_env.gap.search.choice import chosen_of, confirmed_in_order, margin_of
+from spikecam_env.gap.search.choice import NOTHING, ahead_of, chosen_of, confirmed_in_order
 from spikecam_env.gap.search.joint_start import CANCELLING, fit_cancelling_pair, one_by_one
 from spikecam_env.gap.search.round import SAME_SHARE, Round
 from spikecam_env.gap.search.shortlist import fit_from, may_be_shaped, recordings_of
@@ -119,7 +119,7 @@ def try_in_place_of_earlier(problem: Problem, best: Fit, turn: Round) -> tuple[F
     order = sorted(turn.fits, key=lambda f: f.name != name)
     if name != first.name:
         best = replace(done[0], name=best.name, parameters=best.parameters, sd=best.sd)
-    return best, replace(turn, fits=tuple(order), rivals=rivals, margin=margin_of(rest, here.misfit(), done))
+    return best, replace(turn, fits=tuple(order), rivals=rivals, ahead=ahead_of(rest, here.misfit(), done))
 
 
 def try_in_place_of_last(problem: Problem, last: Round, errors: Errors, names: Sequence[str]) -> tuple[Round, Errors]:
@@ -139,7 +139,7 @@ def try_in_place_of_last(problem: Problem, last: Round, errors: Errors, names: S
         tried, known, used_held_out = refined_together(problem, other, [*names[:-1], other.name])
         if tried.misfit < last.fits[0].misfit - problem.settings.deviance.tie:
             rest = [f for f in last.fits if f.name != other.name]
-            last = replace(last, fits=(tried, *rest), rivals=(), margin=0.0, used_held_out=used_held_out)
+            last = replace(last, fits=(tried, *rest), rivals=(), ahead={}, used_held_out=used_held_out)
             errors = known
     return last, errors
 
@@ -226,7 +226,7 @@ def try_cancelling_pair(problem: Problem, names: Sequence[str], rounds: list[Rou
         first,
         fits=(fitted, *(f for f in first.fits if f.name != fitted.name)),
         rivals=(),
-        margin=(last.misfit - fitted.misfit) / (first.start.misfit - fitted.misfit),
+        ahead={NOTHING: (last.misfit - fitted.misfit) / (first.start.misfit - fitted.misfit)},
         used_held_out=used_held_out,
         motion_alone=any(r.motion_alone for r in rounds),
     )

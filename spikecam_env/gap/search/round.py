@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -39,14 +39,23 @@ class Round:
     """The candidates that were fitted, the chosen one first."""
     rivals: tuple[str, ...] = ()
     """Names that may as well be true as the chosen one."""
-    margin: float = 0.0
-    """Of the misfit that the chosen one removes, the share that no other candidate removes (`choice.margin_of`)."""
+    ahead: Mapping[str, float] = field(default_factory=dict)
+    """Of the misfit that the chosen one removes, the share that another candidate does not, by name
+    (`choice.ahead_of`)."""
     used_held_out: bool = False
     """Whether held-out recordings were needed for parameters too."""
     motion_alone: bool = False
     """Whether held-out recordings in motion were fitted, since nothing else disagreed any more."""
     to_join: float = Deviance().accept
     """Misfit that its effect has to remove to be fitted together with the earlier ones."""
+
+    def margin(self, beside: Collection[str]) -> float:
+        """Of the misfit that the chosen one removes, the share that no other candidate removes.
+
+        Args:
+            beside: effects of the final model: another that is there as well is no other name for the chosen one.
+        """
+        return min((share for name, share in self.ahead.items() if name not in beside), default=0.0)
 
 
 def adding(rounds: Sequence[Round]) -> list[tuple[Round, Round]]:

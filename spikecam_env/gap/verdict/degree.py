@@ -7,7 +7,8 @@
 
 Two numbers show that a name is right.
 
-    margin    of the misfit that the effect removes, the share that no other candidate of its round removes
+    margin    of the misfit that the effect removes, the share that no other candidate of its round removes;
+              another effect of the final model is no other candidate
     missed    squares that are left over those of the effects' changes, in the worst of the places that they change
 
 Where only some of the effects have a margin, these are among several, and the others stand for something else.
@@ -87,16 +88,22 @@ def explanation_of(null: Null, values: Floats, rounds: Sequence[Round]) -> Expla
     names = right_names(rounds, limits)
     stand_ins = tuple(name for name in every if name not in names)
     degree = LARGEST if stand_ins or left > limits.most_left else EXPLAINS_NEARLY_ALL
-    explained = Explanation(degree, names, stand_ins, left, missed, min((r.margin for r, _ in steps), default=0.0))
+    explained = Explanation(degree, names, stand_ins, left, missed, min(margins_of(rounds), default=0.0))
     return replace(explained, degree=UNKNOWN) if explained.fault(limits) else explained
 
 
 def right_names(rounds: Sequence[Round], limits: Concluding) -> tuple[str, ...]:
     """Effects with a margin; beside effects without one, those that also remove a share of the misfit."""
     steps = adding(rounds)
-    having = [(r, after) for r, after in steps if r.margin >= limits.least_margin]
+    both = zip(steps, margins_of(rounds), strict=True)
+    having = [step for step, margin in both if margin >= limits.least_margin]
     least = LEAST_SHARE * (rounds[0].start.misfit - rounds[-1].start.misfit) if len(having) < len(steps) else -np.inf
     return tuple(r.fits[0].name for r, after in having if r.start.misfit - after.start.misfit >= least)
+
+
+def margins_of(rounds: Sequence[Round]) -> list[float]:
+    """The margin of each effect of the last model, in the order of their rounds."""
+    return [r.margin(rounds[-1].start.effects) for r, _ in adding(rounds)]
 
 
 def squares_changed(null: Null, rounds: Sequence[Round]) -> Floats:

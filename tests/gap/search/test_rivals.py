@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+
 import numpy as np
-from small import TWINS, made_up_null
+import pytest
+from small import MODEL, TWINS, made_up_null
 
 from spikecam_env.gap.compare.prediction import Null, Prediction
-from spikecam_env.gap.search.choice import is_rival, lead
+from spikecam_env.gap.fit.hypothesis import Fit
+from spikecam_env.gap.search.choice import ahead_of, is_rival, lead
 from spikecam_env.gap.settings import Deviance
 
 TIE = Deviance().tie
@@ -76,3 +80,21 @@ def test_two_laws_that_do_the_same_are_rivals_though_twins_differ():
             missed += not is_rival(n, n.draws, measured, one, other)
     print(f"{missed} missed of {leads} that lead, of 200")
     assert leads > 20 and missed <= 6
+
+
+def left_by(name: str, misfit: float) -> Fit:
+    """A fit of an effect of which only its misfit counts."""
+    return SimpleNamespace(name=name, misfit=misfit, added_to=lambda model: [name])  # type: ignore[return-value]
+
+
+def test_scatter_of_any_shape_is_no_other_name_for_a_change_of_the_mean():
+    """Of a misfit of 110, a drift of the lamp leaves 15: its course is drawn anew, so that it makes anything likely."""
+    lamp, lag, blooming = left_by("lamp_drift", 15.0), left_by("photodiode_lag", 10.0), left_by("blooming", 60.0)
+    assert ahead_of(MODEL, 110.0, [lag, lamp, blooming]) == {"": 1.0, "blooming": 0.5}
+    drifts = ahead_of(MODEL, 110.0, [left_by("lamp_drift", 5.0), lag])
+    assert drifts["photodiode_lag"] == pytest.approx(5.0 / 105.0), "the other way round the mean is an other name"
+
+
+def test_a_fit_that_removes_nothing_is_ahead_of_none():
+    assert not ahead_of(MODEL, 110.0, [left_by("blooming", 120.0)])
+    assert not ahead_of(MODEL, 110.0, [])

@@ -8,7 +8,7 @@ import made_up_search
 import numpy as np
 import pytest
 import small
-from made_up_search import given
+from made_up_search import Ahead, given
 
 from spikecam_env.gap.compare.prediction import TOLERANCE, Null
 from spikecam_env.gap.result import EXPLAINS_ALL, EXPLAINS_NEARLY_ALL, LARGEST, UNKNOWN
@@ -32,7 +32,9 @@ def beside(**noises: float) -> np.ndarray:
     return np.array([noises.get(f"{k.group}_{k.recording}", 0.0) if k.name == "24" else 0.0 for k in KEYS])
 
 
-def explained(values: np.ndarray, *changes: np.ndarray, margin: float | tuple[float, ...] = 0.9) -> Explanation:
+def explained(
+    values: np.ndarray, *changes: np.ndarray, margin: float | tuple[float, ...] | tuple[Ahead, ...] = 0.9
+) -> Explanation:
     return made_up_search.explained(NULL, values, *changes, margin=margin)
 
 
@@ -72,6 +74,17 @@ def test_only_effects_with_a_margin_are_named_beside_others() -> None:
     worse = explained(one + other + off(drift_dark=100.0), one, other, margin=margins)
     assert worse.degree == UNKNOWN, "the stand-in does not help"
     assert explained(one + other, one, other, margin=margins).names == ("dead_time", "crosstalk"), "chance is left"
+
+
+def test_a_candidate_that_is_there_as_well_is_no_other_name() -> None:
+    """Two strong effects each remove much of the same misfit, one before the other is known."""
+    one, other = off(pattern_flat=100.0), off(rates_dark=200.0)
+    seen = one + other + beside(drift_dark=20.0)
+    ahead = {"": 1.0, "crosstalk": 0.1, "blooming": 0.8}, {"": 0.9}
+    assert explained(seen, one, other, margin=ahead).names == ("dead_time", "crosstalk")
+    assert explained(one + beside(drift_dark=20.0), one, margin=ahead[:1]).degree == UNKNOWN, "it is not there"
+    close = {"": 1.0, "crosstalk": 0.1, "blooming": 0.2}, {"": 0.9}
+    assert explained(seen, one, other, margin=close).names == ("crosstalk",)
 
 
 def test_something_elsewhere_says_nothing_on_the_name_and_makes_it_the_largest_of_several() -> None:
