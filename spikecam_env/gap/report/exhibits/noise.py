@@ -9,7 +9,15 @@ import numpy as np
 from spikecam_env.calibration.jitter import Jitter, fit_jitter
 from spikecam_env.gap.observe.conditions import STEADY
 from spikecam_env.gap.observe.observation import DIFFERENCES, ObservedRecording
-from spikecam_env.gap.report.panels import PlotPanel, ReportedRecording, by_recording, panel_by_recording, takes
+from spikecam_env.gap.report.panels import (
+    Array,
+    PlotPanel,
+    ReportedRecording,
+    by_recording,
+    mean_known,
+    panel_by_recording,
+    takes,
+)
 from spikecam_env.gap.result import Evidence
 
 TITLE = "Temporal noise"
@@ -35,8 +43,13 @@ def panels(evidence: Evidence, frame_rate_hz: float) -> Iterator[PlotPanel]:
         variance = by_recording(enough, lambda o: o.variance)
         off = variance.less_model(100 / variance.before)
         yield panel_by_recording("Variance of intervals", "variance over the model's, less 1 [%]", enough, off)
-        correlation = by_recording(enough, lambda o: o.covariance / np.nanmean(o.variance))
+        correlation = by_recording(enough, lag_one)
         yield panel_by_recording("Correlation of successive intervals", "lag-1 correlation [1]", enough, correlation)
+
+
+def lag_one(o: ObservedRecording) -> Array:
+    """(P,) covariance of successive intervals over the mean variance; NaN where pixels have too few spikes."""
+    return np.asarray(o.covariance / mean_known(o.variance, np.isfinite(o.variance)))
 
 
 def _noise_by_step(static: Sequence[ReportedRecording]) -> PlotPanel | None:
