@@ -19,11 +19,11 @@ BENDS = ("dead_time", "comparator_delay")
 
 
 def diagnosed(folder: Path, effects, recordings, names: tuple[str, ...], **options) -> Diagnosis:
-    """The diagnosis of a camera of 16 x 16 pixels for 600 frames a recording, by a few twins."""
+    """The diagnosis of a camera of 16 x 16 pixels for 1200 frames a recording, by a few twins."""
     model = MODEL
     for each in effects:
         model = model.with_effect(each)
-    made = write_campaign(folder / "c", model, shape=(16, 16), frames=600, recordings=recordings, seed=4)
+    made = write_campaign(folder / "c", model, shape=(16, 16), frames=1200, recordings=recordings, seed=4)
     found = diagnose(made, candidates=tuple(dict.fromkeys(names)), twin_count=4, progress=False, **options)
     print(found.sentence, {e.name: e.parameters for e in found.effects}, found.data)
     return found

@@ -14,7 +14,7 @@ from small import MODEL, effect, problem_of, recorded
 
 from spikecam_env.gap.baseline.null_model import model_null
 from spikecam_env.gap.fit.candidate import fit
-from spikecam_env.gap.fit.gauss_newton import derivatives, moved
+from spikecam_env.gap.fit.gauss_newton import Probe, derivatives, moved
 from spikecam_env.gap.fit.hypothesis import Fit
 from spikecam_env.gap.fit.predict import predict_by_twins
 from spikecam_env.gap.fit.problem import Problem
@@ -45,9 +45,7 @@ def test_derivatives_are_of_a_unit_that_has_settled() -> None:
     problem, found = fitted()
     without = problem.null
 
-    def probe(model, base):
-        return predict_by_twins(problem.case, model, base, without, 3)
-
+    probe = Probe(lambda model, base, count: predict_by_twins(problem.case, model, base, without, count), 3)
     at = probe(found.model, found.base)
     free = [("crosstalk", "kick")]
     columns, _ = derivatives(problem, probe, found.model, found.base, at, free)
