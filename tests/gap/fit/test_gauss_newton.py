@@ -32,10 +32,10 @@ def law(fraction: float, tau_us: float) -> np.ndarray:
     return strength * np.where(np.arange(COUNT) < 30, 1.0, (tau_us / TRUE["tau_us"]) ** 0.5)
 
 
-def probe_of(n: Null, change: Callable[..., np.ndarray], asked: list[SensorModel] | None = None) -> Probe:
+def probe_of(n: Null, change: Callable[..., np.ndarray], probed: list[SensorModel] | None = None) -> Probe:
     def probe(model: SensorModel, base: BaseFit, count: int) -> Prediction:
-        if asked is not None:
-            asked.append(model)
+        if probed is not None:
+            probed.append(model)
         [effect] = [e for e in model.effects if e.name == NAME]
         values = n.mean + change(**{k: effect.parameters()[k] for k in TRUE})
         return Prediction(values, n.sd / np.sqrt(TWINS), n.sd, (Draw(TWINS - 1, values, None),))

@@ -92,7 +92,7 @@ def test_scatter_of_any_shape_is_no_other_name_for_a_change_of_the_mean():
     lamp, lag, blooming = left_by("lamp_drift", 15.0), left_by("photodiode_lag", 10.0), left_by("blooming", 60.0)
     assert ahead_of(MODEL, 110.0, [lag, lamp, blooming]) == {"": 1.0, "blooming": 0.5}
     drifts = ahead_of(MODEL, 110.0, [left_by("lamp_drift", 5.0), lag])
-    assert drifts["photodiode_lag"] == pytest.approx(5.0 / 105.0), "the other way round the mean is an other name"
+    assert drifts["photodiode_lag"] == pytest.approx(5.0 / 105.0), "the other way round the mean is another name"
 
 
 def test_a_fit_that_removes_nothing_is_ahead_of_none():

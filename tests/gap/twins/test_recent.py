@@ -20,31 +20,28 @@ DARK = (0,)
 
 
 @pytest.fixture
-def case(monkeypatch) -> Case:
-    simulated = []
-    made = simulation._twin
-    monkeypatch.setattr(simulation, "_twin", lambda *args: simulated.append(args) or made(*args))
-    new = replace(recorded(effect("dead_time", tau_us=0.05), seed=1), recent=RecentTwins(), budget=Budget())
-    object.__setattr__(new, "simulated", simulated)
-    return new
+def case() -> Case:
+    return replace(recorded(effect("dead_time", tau_us=0.05), seed=1), recent=RecentTwins(), budget=Budget())
 
 
-def simulated(case: Case) -> int:
-    """Campaigns that were simulated, which are as many as the budget has counted."""
-    assert len(case.simulated) == case.budget.simulated  # type: ignore[attr-defined]
-    return case.budget.simulated
+@pytest.fixture
+def simulated(monkeypatch) -> list:
+    """Campaigns, as they are simulated."""
+    campaigns, made = [], simulation._twin
+    monkeypatch.setattr(simulation, "_twin", lambda *args: campaigns.append(args) or made(*args))
+    return campaigns
 
 
-def test_more_twins_of_the_same_model_are_the_same_and_more(case):
+def test_more_twins_of_the_same_model_are_the_same_and_more(case, simulated):
     few, many = (twins(case, MODEL, case.base, range(n), DARK) for n in (2, 3))
-    assert simulated(case) == 3
+    assert len(simulated) == case.budget.simulated == 3
     fresh = replace(case, recent=RecentTwins(), budget=Budget())
     for known, new in zip([*few, many[2]], twins(fresh, MODEL, case.base, range(3), DARK), strict=True):
         assert known.bank == new.bank and known.bank
 
 
 @pytest.mark.parametrize("changed", ["model", "unit", "number", "recordings", "light"])
-def test_another_campaign_is_simulated(case, changed):
+def test_another_campaign_is_simulated(case, simulated, changed):
     def campaign(case: Case, model: SensorModel, base: BaseFit, number: int, only: tuple[int, ...]) -> None:
         twins(case, model, base, [number], only)
 
@@ -58,15 +55,15 @@ def test_another_campaign_is_simulated(case, changed):
         "light": {"case": replace(case, conditions=(dimmer, *case.conditions[1:]))},
     }[changed]
     campaign(**given)
-    before = len(case.simulated)  # type: ignore[attr-defined]
+    before = len(simulated)
     campaign(**(given | other))
-    assert len(case.simulated) == before + 1  # type: ignore[attr-defined]
+    assert len(simulated) == before + 1
 
 
-def test_a_campaign_that_is_no_longer_kept_is_counted_once(case):
+def test_a_campaign_that_is_no_longer_kept_is_counted_once(case, simulated):
     twins(case, MODEL, case.base, range(MOST_KEPT + 1), DARK)
     twins(case, MODEL, case.base, [0], DARK)
-    assert len(case.simulated) == MOST_KEPT + 2  # type: ignore[attr-defined]
+    assert len(simulated) == MOST_KEPT + 2
     assert case.budget.simulated == MOST_KEPT + 1
 
 
